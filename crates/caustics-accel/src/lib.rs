@@ -1,0 +1,5 @@
+//! Triangle and photon acceleration structures.
+
+mod intersect;
+
+pub use intersect::Intersect;

@@ -1,0 +1,37 @@
+use glam::Vec3;
+
+/// A half-line, limited to the parameters `t_min < t < t_max`.
+///
+/// The point at parameter `t` is `origin + t * direction`. The direction need not be of unit
+/// length; `t` counts in units of its length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where the ray starts, in metres.
+    pub origin: Vec3,
+    /// Where it goes; not zero.
+    pub direction: Vec3,
+    /// Nearest parameter at which a hit counts, exclusive.
+    pub t_min: f32,
+    /// Farthest parameter at which a hit counts, exclusive.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// A ray without a far limit.
+    #[must_use]
+    pub const fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
+    }
+
+    /// A ray whose hits must lie strictly between `t_min` and `t_max`.
+    #[must_use]
+    pub const fn with_range(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
+        Self { origin, direction, t_min, t_max }
+    }
+
+    /// The point at parameter `t`.
+    #[must_use]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + t * self.direction
+    }
+}
