@@ -1,0 +1,33 @@
+use caustics_accel::AccelError;
+use thiserror::Error;
+
+/// What can be wrong with a picture's or an estimate's input.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// A picture without pixels, or with more than fit in memory.
+    #[error("the picture's size {width} x {height} is not between 1 x 1 and {limit} x {limit}")]
+    InvalidSize {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// The largest width and height.
+        limit: u32,
+    },
+    /// No samples a pixel.
+    #[error("the number of samples a pixel must be at least 1")]
+    NoSamples,
+    /// An estimate from no photons.
+    #[error("the number of nearest photons must be at least 1")]
+    NoNeighbours,
+    /// A search radius that is not a positive number.
+    #[error("the search radius {radius} is not a positive, finite number of metres")]
+    InvalidRadius {
+        /// The radius, in metres.
+        radius: f32,
+    },
+    /// A structure that photons are found with could not be built.
+    #[error(transparent)]
+    Accel(#[from] AccelError),
+}

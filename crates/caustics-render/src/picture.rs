@@ -1,0 +1,188 @@
+use caustics_accel::{Intersect, NearestScratch};
+use caustics_filter::Image;
+use caustics_sampling::CounterRng;
+use caustics_scene::{Camera, World};
+use caustics_trace::MediumStack;
+use glam::Vec3;
+
+use crate::direct::DirectLight;
+use crate::error::RenderError;
+use crate::eye::EyeTracer;
+use crate::nearest::NearestEstimate;
+use crate::pixel::PixelSamples;
+
+/// The largest width and height of a picture.
+const MAX_SIZE: u32 = 32_768;
+
+/// Through what the camera may see a caustic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Visibility {
+    /// Caustics only where the camera sees the receiver itself: `L S+ D E`.
+    Direct,
+    /// Also through glass and in mirrors: `L S+ D S* E`.
+    #[default]
+    Full,
+}
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureOptions {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Samples a pixel, at least 1.
+    pub samples: u32,
+    /// Chooses the random numbers; the same seed gives the same bits.
+    pub seed: u64,
+    /// Surfaces that an eye path may meet.
+    pub max_depth: u32,
+    /// Through what caustics are seen.
+    pub visibility: Visibility,
+}
+
+impl Default for PictureOptions {
+    fn default() -> Self {
+        Self {
+            width: 1024,
+            height: 768,
+            samples: 4,
+            seed: 0,
+            max_depth: 32,
+            visibility: Visibility::Full,
+        }
+    }
+}
+
+impl PictureOptions {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// A size or a number of samples out of range.
+    pub fn validate(&self) -> Result<(), RenderError> {
+        let range = 1..=MAX_SIZE;
+        if !range.contains(&self.width) || !range.contains(&self.height) {
+            return Err(RenderError::InvalidSize {
+                width: self.width,
+                height: self.height,
+                limit: MAX_SIZE,
+            });
+        }
+        if self.samples == 0 {
+            return Err(RenderError::NoSamples);
+        }
+        Ok(())
+    }
+}
+
+/// A picture in two parts, each linear radiance in W/(sr m²).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Emissive surfaces and direct light, also through glass and in mirrors.
+    pub direct: Image,
+    /// The caustics.
+    pub caustics: Image,
+    /// Rays traced from the eye, shadow rays not among them.
+    pub rays: u64,
+}
+
+/// Renders direct light and, where photons are given, their caustics.
+///
+/// `progress` is called with the number of rows that have just been finished, from any thread.
+///
+/// # Errors
+/// If the options are out of range.
+pub fn render<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    camera: &Camera,
+    estimate: Option<&NearestEstimate<'_>>,
+    options: &PictureOptions,
+    progress: &(dyn Fn(u32) + Sync),
+) -> Result<Picture, RenderError> {
+    options.validate()?;
+    let eye = camera.ray(0.5 * options.width as f32, 0.5 * options.height as f32, options.width, options.height);
+    let renderer = RowRenderer {
+        world,
+        intersect,
+        camera,
+        estimate,
+        options,
+        media: MediumStack::at(world, intersect, eye.origin),
+    };
+    let finish = |row: u32| {
+        let finished = renderer.render(row);
+        progress(1);
+        finished
+    };
+    #[cfg(feature = "parallel")]
+    let rows: Vec<Row> = {
+        use rayon::prelude::*;
+        (0..options.height).into_par_iter().map(finish).collect()
+    };
+    #[cfg(not(feature = "parallel"))]
+    let rows: Vec<Row> = (0..options.height).map(finish).collect();
+
+    let mut picture = Picture {
+        direct: Image::black(options.width, options.height)?,
+        caustics: Image::black(options.width, options.height)?,
+        rays: 0,
+    };
+    for (y, row) in rows.into_iter().enumerate() {
+        picture.direct.row_mut(y as u32).copy_from_slice(&row.direct);
+        picture.caustics.row_mut(y as u32).copy_from_slice(&row.caustics);
+        picture.rays += row.rays;
+    }
+    Ok(picture)
+}
+
+struct Row {
+    direct: Vec<[f32; 3]>,
+    caustics: Vec<[f32; 3]>,
+    rays: u64,
+}
+
+struct RowRenderer<'a, I: ?Sized> {
+    world: &'a World,
+    intersect: &'a I,
+    camera: &'a Camera,
+    estimate: Option<&'a NearestEstimate<'a>>,
+    options: &'a PictureOptions,
+    media: MediumStack,
+}
+
+impl<I: Intersect + ?Sized> RowRenderer<'_, I> {
+    fn render(&self, y: u32) -> Row {
+        let options = self.options;
+        let mut eye = EyeTracer::new(self.world, self.intersect, options.max_depth);
+        let direct_light = DirectLight::new(self.world, self.intersect);
+        let mut scratch = NearestScratch::new();
+        let mut row = Row { direct: Vec::new(), caustics: Vec::new(), rays: 0 };
+        for x in 0..options.width {
+            let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
+            let mut rng = CounterRng::new(options.seed, pixel);
+            let (mut direct, mut caustics) = (Vec3::ZERO, Vec3::ZERO);
+            for offset in PixelSamples::new(options.samples, &mut rng) {
+                let ray = self.camera.ray(
+                    x as f32 + offset.x,
+                    y as f32 + offset.y,
+                    options.width,
+                    options.height,
+                );
+                direct += eye.trace(ray, self.media, &mut rng, |receiver, rng| {
+                    direct += receiver.weight * direct_light.radiance(receiver, rng);
+                    let counts =
+                        receiver.seen_directly || options.visibility == Visibility::Full;
+                    if let Some(estimate) = self.estimate.filter(|_| counts) {
+                        caustics += receiver.weight * estimate.radiance(receiver, &mut scratch);
+                    }
+                });
+            }
+            let scale = 1.0 / options.samples as f32;
+            row.direct.push((direct * scale).to_array());
+            row.caustics.push((caustics * scale).to_array());
+        }
+        row.rays = eye.rays;
+        row
+    }
+}

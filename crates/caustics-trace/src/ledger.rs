@@ -1,0 +1,203 @@
+use glam::{DVec3, Vec3};
+
+/// What became of a photon's flux.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Fate {
+    /// Kept as a photon on a receiver: the caustic.
+    Stored,
+    /// Turned into heat in a coloured medium or on a metal.
+    Absorbed,
+    /// Left the scene after at least one specular event.
+    Escaped,
+    /// Left the scene without meeting anything.
+    Missed,
+    /// Emitted outside the directions or the disc that holds the specular objects; not traced,
+    /// because it can make no caustic.
+    Unaimed,
+    /// Met a receiver before anything specular: direct light, which is not a caustic.
+    Direct,
+    /// Cut off at the maximum depth.
+    TooDeep,
+    /// Ended by Russian roulette.
+    Roulette,
+    /// Lost to a direction or a position that was not a finite number.
+    Invalid,
+}
+
+impl Fate {
+    /// All fates, in the order of the ledger's lines.
+    pub const ALL: [Self; 9] = [
+        Self::Stored,
+        Self::Absorbed,
+        Self::Escaped,
+        Self::Missed,
+        Self::Unaimed,
+        Self::Direct,
+        Self::TooDeep,
+        Self::Roulette,
+        Self::Invalid,
+    ];
+
+    /// A short name in lower case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stored => "stored",
+            Self::Absorbed => "absorbed",
+            Self::Escaped => "escaped",
+            Self::Missed => "missed",
+            Self::Unaimed => "unaimed",
+            Self::Direct => "direct",
+            Self::TooDeep => "too deep",
+            Self::Roulette => "roulette",
+            Self::Invalid => "invalid",
+        }
+    }
+}
+
+/// One line of the ledger.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LedgerEntry {
+    /// How many path ends, or for [`Fate::Absorbed`] how many absorbing events.
+    pub count: u64,
+    /// Flux, in watts, for each channel.
+    pub flux: DVec3,
+}
+
+impl LedgerEntry {
+    fn add(&mut self, flux: Vec3) {
+        self.count += 1;
+        self.flux += flux.as_dvec3();
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.flux += other.flux;
+    }
+}
+
+/// Where the energy went: every watt that the lights emit is booked once.
+///
+/// `emitted + roulette gain = stored + absorbed + escaped + … + roulette`, for each channel, up to
+/// rounding; [`EnergyLedger::imbalance`] says by how much it fails. Roulette ends some paths and
+/// strengthens the rest: what it gave is kept beside what it took, and their difference is zero in
+/// the mean.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnergyLedger {
+    emitted: LedgerEntry,
+    roulette_gain: DVec3,
+    fates: [LedgerEntry; Fate::ALL.len()],
+    /// Events at which the geometric normal served because the interpolated one faced away from
+    /// the ray or would have sent light to the wrong side of the surface.
+    pub normal_fallbacks: u64,
+    /// Differentials that were shortened to the limit, at a critical angle or a grazing event.
+    pub bounded_differentials: u64,
+    /// Rays traced, shadow rays not among them.
+    pub rays: u64,
+}
+
+impl EnergyLedger {
+    /// What the lights emitted.
+    #[must_use]
+    pub fn emitted(&self) -> LedgerEntry {
+        self.emitted
+    }
+
+    /// What ended as `fate`.
+    #[must_use]
+    pub fn entry(&self, fate: Fate) -> LedgerEntry {
+        self.fates[fate as usize]
+    }
+
+    /// The flux that surviving paths were given by Russian roulette, in watts.
+    #[must_use]
+    pub fn roulette_gain(&self) -> DVec3 {
+        self.roulette_gain
+    }
+
+    /// The flux of all fates together, in watts.
+    #[must_use]
+    pub fn accounted(&self) -> DVec3 {
+        self.fates.iter().map(|entry| entry.flux).sum()
+    }
+
+    /// The largest difference of a channel between what came in and what is accounted for,
+    /// relative to the brightest channel of what came in; 0 when nothing was emitted.
+    #[must_use]
+    pub fn imbalance(&self) -> f64 {
+        let incoming = self.emitted.flux + self.roulette_gain;
+        let scale = incoming.max_element();
+        if scale <= 0.0 {
+            return 0.0;
+        }
+        (incoming - self.accounted()).abs().max_element() / scale
+    }
+
+    /// Books a photon's emission.
+    pub fn emit(&mut self, flux: Vec3) {
+        self.emitted.add(flux);
+    }
+
+    /// Books flux that a light sends where no photon is traced, in watts, as emitted and unaimed.
+    pub fn emit_unaimed(&mut self, flux: DVec3) {
+        self.emitted.flux += flux;
+        self.fates[Fate::Unaimed as usize].flux += flux;
+    }
+
+    /// Books the end, or for [`Fate::Absorbed`] the loss, of `flux`.
+    pub fn book(&mut self, fate: Fate, flux: Vec3) {
+        self.fates[fate as usize].add(flux);
+    }
+
+    /// Books flux that a surviving path was given.
+    pub fn gain(&mut self, flux: Vec3) {
+        self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// Adds another ledger's lines to this one.
+    pub fn merge(&mut self, other: &Self) {
+        self.emitted.merge(&other.emitted);
+        self.roulette_gain += other.roulette_gain;
+        for (mine, theirs) in self.fates.iter_mut().zip(&other.fates) {
+            mine.merge(theirs);
+        }
+        self.normal_fallbacks += other.normal_fallbacks;
+        self.bounded_differentials += other.bounded_differentials;
+        self.rays += other.rays;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ledger_balances_only_when_everything_is_booked() {
+        let mut ledger = EnergyLedger::default();
+        ledger.emit(Vec3::new(1.0, 2.0, 4.0));
+        ledger.emit_unaimed(DVec3::splat(0.5));
+        assert!((ledger.imbalance() - 4.0 / 4.5).abs() < 1e-12);
+        ledger.book(Fate::Stored, Vec3::new(0.5, 2.0, 4.0));
+        ledger.book(Fate::Absorbed, Vec3::new(0.5, 0.0, 0.0));
+        assert_eq!(ledger.imbalance(), 0.0);
+        ledger.gain(Vec3::ONE);
+        assert!(ledger.imbalance() > 0.1);
+        ledger.book(Fate::Roulette, Vec3::ONE);
+        assert_eq!(ledger.imbalance(), 0.0);
+    }
+
+    #[test]
+    fn merging_adds_every_line() {
+        let mut one = EnergyLedger::default();
+        one.emit(Vec3::ONE);
+        one.book(Fate::Missed, Vec3::ONE);
+        one.rays = 3;
+        let mut two = one.clone();
+        two.merge(&one);
+        assert_eq!(two.emitted().count, 2);
+        assert_eq!(two.entry(Fate::Missed).flux, DVec3::splat(2.0));
+        assert_eq!(two.rays, 6);
+        assert_eq!(two.imbalance(), 0.0);
+    }
+}

@@ -1,0 +1,64 @@
+use caustics_sampling::Sequence;
+
+/// What happens to a photon where a surface both reflects and refracts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Branching {
+    /// It goes one way, chosen with the Fresnel term as the probability, at its full flux.
+    #[default]
+    Roulette,
+    /// It goes both ways at the first such event, each with its part of the flux, and one way at
+    /// every later one.
+    SplitFirst,
+    /// It goes both ways at every such event, each with its part of the flux, until a part falls
+    /// below [`TraceOptions::min_weight`].
+    SplitAll,
+}
+
+/// Where the lights aim their photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Aim {
+    /// Into every direction in which the light shines. A directional light covers the bounding
+    /// sphere of the scene.
+    Everywhere,
+    /// Into a cone (or, for a directional light, a disc) that holds the bounding sphere of all
+    /// specular objects. Nothing that could become a caustic is left out.
+    #[default]
+    Casters,
+}
+
+/// How photons are traced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TraceOptions {
+    /// Photons emitted, by all lights together.
+    pub photons: u32,
+    /// Chooses the random numbers; the same seed gives the same bits.
+    pub seed: u64,
+    /// Surfaces that a path may meet before it is cut off. Long chains of inner reflections carry
+    /// real energy: at 24, a scene with several glasses loses 2.5 % of its caustic.
+    pub max_depth: u32,
+    /// What happens where a surface both reflects and refracts.
+    pub branching: Branching,
+    /// Paths whose flux falls below this part of their emitted flux meet Russian roulette, at
+    /// which a survivor gets exactly this part. In 0..=1; 0 turns it off.
+    pub min_weight: f32,
+    /// Where the lights aim.
+    pub aim: Aim,
+    /// The points that choose emission directions and positions.
+    pub sequence: Sequence,
+}
+
+impl Default for TraceOptions {
+    fn default() -> Self {
+        Self {
+            photons: 1_000_000,
+            seed: 0,
+            max_depth: 128,
+            branching: Branching::Roulette,
+            min_weight: 1e-3,
+            aim: Aim::Casters,
+            sequence: Sequence::Halton,
+        }
+    }
+}

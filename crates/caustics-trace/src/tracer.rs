@@ -1,0 +1,261 @@
+use caustics_accel::Intersect;
+use caustics_geometry::Ray;
+use caustics_sampling::CounterRng;
+use caustics_scene::{Surface, SurfacePoint, World};
+use glam::Vec3;
+
+use crate::differential::RayDifferential;
+use crate::emission::Emission;
+use crate::ledger::{EnergyLedger, Fate};
+use crate::media::MediumStack;
+use crate::optics::beer_lambert;
+use crate::options::{Branching, TraceOptions};
+use crate::photon::Photon;
+use crate::scatter::{Event, Outgoing, Scattering, scatter};
+
+/// The longest change of direction, in radians for one sample spacing, that a differential keeps.
+/// Beyond it a first derivative says nothing about where the neighbour goes.
+const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
+
+/// A path, or a branch of one, on its way to the next surface.
+#[derive(Clone, Copy)]
+struct Branch<const N: usize> {
+    ray: Ray,
+    differential: RayDifferential<N>,
+    flux: Vec3,
+    media: MediumStack,
+    /// Surfaces met so far.
+    depth: u32,
+    /// Specular events so far.
+    events: u32,
+    has_split: bool,
+    channel: Option<u8>,
+}
+
+/// Traces photons one at a time; holds the memory that they share.
+pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
+    world: &'a World,
+    intersect: &'a I,
+    options: &'a TraceOptions,
+    pending: Vec<Branch<N>>,
+    pub(crate) photons: Vec<Photon>,
+    pub(crate) ledger: EnergyLedger,
+}
+
+impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
+    pub(crate) fn new(world: &'a World, intersect: &'a I, options: &'a TraceOptions) -> Self {
+        Self {
+            world,
+            intersect,
+            options,
+            pending: Vec::new(),
+            photons: Vec::new(),
+            ledger: EnergyLedger::default(),
+        }
+    }
+
+    /// Follows one emitted photon and all its branches to their ends.
+    pub(crate) fn trace(&mut self, emission: &Emission<N>, media: MediumStack, rng: &mut CounterRng) {
+        self.ledger.emit(emission.flux);
+        let threshold = self.options.min_weight * emission.flux.max_element();
+        self.pending.push(Branch {
+            ray: emission.ray,
+            differential: emission.differential,
+            flux: emission.flux,
+            media,
+            depth: 0,
+            events: 0,
+            has_split: false,
+            channel: None,
+        });
+        while let Some(branch) = self.pending.pop() {
+            self.advance(branch, threshold, rng);
+        }
+    }
+
+    /// Takes a branch to the next surface and queues what leaves it.
+    fn advance(&mut self, mut branch: Branch<N>, threshold: f32, rng: &mut CounterRng) {
+        if !(branch.ray.origin.is_finite() && branch.ray.direction.is_finite()) {
+            self.ledger.book(Fate::Invalid, branch.flux);
+            return;
+        }
+        self.ledger.rays += 1;
+        let Some(hit) = self.intersect.closest_hit(&branch.ray) else {
+            let fate = if branch.events == 0 { Fate::Missed } else { Fate::Escaped };
+            self.ledger.book(fate, branch.flux);
+            return;
+        };
+        let point = self.world.surface(&branch.ray, &hit);
+        self.absorb(&mut branch, hit.t);
+        branch.differential = branch.differential.transferred(
+            branch.ray.direction,
+            hit.t,
+            point.geometric_normal,
+        );
+        branch.depth += 1;
+
+        let split = branch.channel.is_none() && self.disperses(&point);
+        for channel in 0..if split { 3usize } else { 1 } {
+            let mut part = branch;
+            if split {
+                part.flux = Vec3::ZERO;
+                part.flux[channel] = branch.flux[channel];
+                part.channel = Some(channel as u8);
+                if part.flux == Vec3::ZERO {
+                    continue;
+                }
+            }
+            match scatter(self.world, &point, part.ray.direction, &part.media, part.channel) {
+                None => self.receive(&part, &point),
+                Some(_) if part.depth >= self.options.max_depth => {
+                    self.ledger.book(Fate::TooDeep, part.flux);
+                }
+                Some(scattering) => self.branch_out(&part, &point, &scattering, threshold, rng),
+            }
+        }
+    }
+
+    fn disperses(&self, point: &SurfacePoint) -> bool {
+        matches!(
+            *self.world.surface_of(point.object),
+            Surface::Dielectric { dispersion, .. } if dispersion > 0.0
+        )
+    }
+
+    fn absorb(&mut self, branch: &mut Branch<N>, distance: f32) {
+        let attenuation = branch.media.attenuation(self.world);
+        if attenuation != Vec3::ZERO {
+            let arriving = branch.flux * beer_lambert(attenuation, distance);
+            self.ledger.book(Fate::Absorbed, branch.flux - arriving);
+            branch.flux = arriving;
+        }
+    }
+
+    fn receive(&mut self, branch: &Branch<N>, point: &SurfacePoint) {
+        if branch.events == 0 {
+            self.ledger.book(Fate::Direct, branch.flux);
+            return;
+        }
+        self.ledger.book(Fate::Stored, branch.flux);
+        let side = if point.from_outside { 1.0 } else { -1.0 };
+        self.photons.push(Photon {
+            position: point.spawn.position,
+            incoming: branch.ray.direction,
+            flux: branch.flux,
+            normal: side * point.geometric_normal,
+            axes: branch.differential.footprint_axes(point.geometric_normal),
+            object: point.object,
+            events: branch.events,
+        });
+    }
+
+    fn branch_out(
+        &mut self,
+        branch: &Branch<N>,
+        point: &SurfacePoint,
+        scattering: &Scattering,
+        threshold: f32,
+        rng: &mut CounterRng,
+    ) {
+        self.ledger.normal_fallbacks += u64::from(scattering.fallbacks);
+        if scattering.absorbed != Vec3::ZERO {
+            self.ledger.book(Fate::Absorbed, branch.flux * scattering.absorbed);
+        }
+        let both = scattering.outgoing().count() == 2;
+        let splits = match self.options.branching {
+            Branching::Roulette => false,
+            Branching::SplitFirst => !branch.has_split,
+            Branching::SplitAll => true,
+        };
+        if both && !splits {
+            // The Fresnel term is the same for all channels, so the choice leaves the flux as it is.
+            let choice = rng.next_f32();
+            let mut below = 0.0;
+            let chosen = scattering.outgoing().find(|it| {
+                below += it.weight.x;
+                choice < below
+            });
+            if let Some(outgoing) = chosen.or(scattering.outgoing().last()) {
+                let kept = outgoing.weight.x;
+                self.follow(branch, point, outgoing, branch.flux, kept, threshold, rng);
+            }
+        } else {
+            for outgoing in scattering.outgoing() {
+                let flux = branch.flux * outgoing.weight;
+                self.follow(branch, point, outgoing, flux, 1.0, threshold, rng);
+            }
+        }
+    }
+
+    /// Queues one outgoing direction, if roulette lets it live. `kept` is the part of such paths
+    /// that were chosen to go on here.
+    #[expect(clippy::too_many_arguments, reason = "the state of one event, used in one place")]
+    fn follow(
+        &mut self,
+        branch: &Branch<N>,
+        point: &SurfacePoint,
+        outgoing: &Outgoing,
+        flux: Vec3,
+        mut kept: f32,
+        threshold: f32,
+        rng: &mut CounterRng,
+    ) {
+        let strongest = flux.max_element();
+        if strongest <= 0.0 {
+            return;
+        }
+        let mut flux = flux;
+        if strongest < threshold {
+            let survival = strongest / threshold;
+            if rng.next_f32() >= survival {
+                self.ledger.book(Fate::Roulette, flux);
+                return;
+            }
+            self.ledger.gain(flux / survival - flux);
+            flux /= survival;
+            kept *= survival;
+        }
+        // Where only a part of the paths goes on, those that do stand farther apart.
+        let differential = self.scattered(branch, point, outgoing).scaled(kept.powf(-1.0 / N as f32));
+        let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
+        self.ledger.bounded_differentials += u64::from(shortened);
+        let origin = point.spawn.origin_towards(point.geometric_normal, outgoing.direction);
+        self.pending.push(Branch {
+            ray: Ray::new(origin, outgoing.direction),
+            differential,
+            flux,
+            media: outgoing.media,
+            depth: branch.depth,
+            events: branch.events + u32::from(outgoing.event != Event::Passage),
+            has_split: branch.has_split || outgoing.weight.max_element() < 1.0,
+            channel: branch.channel,
+        });
+    }
+
+    fn scattered(
+        &self,
+        branch: &Branch<N>,
+        point: &SurfacePoint,
+        outgoing: &Outgoing,
+    ) -> RayDifferential<N> {
+        let before = &branch.differential;
+        let direction = branch.ray.direction;
+        let normal_change = if outgoing.interpolated {
+            let side = if point.from_outside { 1.0 } else { -1.0 };
+            before.position.map(|moved| side * self.world.shading_normal_change(point, moved))
+        } else {
+            [Vec3::ZERO; N]
+        };
+        match outgoing.event {
+            Event::Passage => *before,
+            Event::Reflection => before.reflected(direction, outgoing.normal, normal_change),
+            Event::Refraction => before.refracted(
+                direction,
+                outgoing.direction,
+                outgoing.normal,
+                outgoing.eta,
+                normal_change,
+            ),
+        }
+    }
+}
