@@ -1,4 +1,5 @@
 use caustics_sampling::Sequence;
+use thiserror::Error;
 
 /// What happens to a photon where a surface both reflects and refracts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -61,4 +62,38 @@ impl Default for TraceOptions {
             sequence: Sequence::Halton,
         }
     }
+}
+
+impl TraceOptions {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// A weight out of range, or a depth at which no photon could be stored.
+    pub fn validate(&self) -> Result<(), TraceError> {
+        if !(0.0..=1.0).contains(&self.min_weight) {
+            return Err(TraceError::MinWeight { min_weight: self.min_weight });
+        }
+        if self.max_depth < 2 {
+            return Err(TraceError::MaxDepth { max_depth: self.max_depth });
+        }
+        Ok(())
+    }
+}
+
+/// What can be wrong with the options of a tracing.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum TraceError {
+    /// A roulette threshold that is not a part of the whole.
+    #[error("the least weight {min_weight} is not between 0 and 1")]
+    MinWeight {
+        /// The threshold.
+        min_weight: f32,
+    },
+    /// A depth at which no path reaches a receiver after a specular surface.
+    #[error("the maximum depth {max_depth} is less than 2, so no caustic could be stored")]
+    MaxDepth {
+        /// The depth.
+        max_depth: u32,
+    },
 }

@@ -1,0 +1,109 @@
+use caustics_accel::Intersect;
+use caustics_sampling::{CounterRng, apportion};
+use caustics_scene::World;
+
+use crate::emission::Emitter;
+use crate::media::MediumStack;
+use crate::options::{TraceError, TraceOptions};
+use crate::photon::PhotonMap;
+use crate::tracer::PathTracer;
+
+/// Photons that one task traces: enough to share out, few enough to balance.
+const CHUNK: u32 = 2048;
+
+/// Traces photons from all lights of `world` and returns those that landed after at least one
+/// specular event, with the ledger of where all the energy went.
+///
+/// The photons are shared among the lights by the power that each sends towards the specular
+/// objects. The result does not depend on the number of threads. `progress` is called with the
+/// number of photons just finished, from any thread.
+///
+/// # Errors
+/// If the options are out of range.
+pub fn trace_photons<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    options: &TraceOptions,
+    progress: &(dyn Fn(u32) + Sync),
+) -> Result<PhotonMap, TraceError> {
+    options.validate()?;
+    let emitters = Emitter::all(world, options.aim);
+    let counts = share(&emitters, options.photons);
+    let mut map = PhotonMap::default();
+    let mut first = 0u32;
+    for (emitter, &count) in emitters.iter().zip(&counts) {
+        let media = emitter
+            .start()
+            .map_or(MediumStack::EMPTY, |start| MediumStack::at(world, intersect, start));
+        let batch = Batch { world, intersect, options, emitter, media, first, count };
+        let before = map.ledger.emitted().flux;
+        if emitter.dimensions() == 2 {
+            batch.trace::<2>(&mut map, progress);
+        } else {
+            batch.trace::<4>(&mut map, progress);
+        }
+        let aimed = map.ledger.emitted().flux - before;
+        map.ledger.emit_unaimed(emitter.power() - aimed);
+        first += count;
+    }
+    Ok(map)
+}
+
+/// How many of `total` photons each emitter gets.
+fn share(emitters: &[Emitter<'_>], total: u32) -> Vec<u32> {
+    let weights: Vec<f64> = emitters.iter().map(|it| it.aimed_power().element_sum()).collect();
+    apportion(&weights, total as usize)
+        .map_or_else(|_| vec![0; emitters.len()], |counts| counts.into_iter().map(|it| it as u32).collect())
+}
+
+/// The photons of one emitter.
+struct Batch<'a, I: ?Sized> {
+    world: &'a World,
+    intersect: &'a I,
+    options: &'a TraceOptions,
+    emitter: &'a Emitter<'a>,
+    /// The media around the light.
+    media: MediumStack,
+    /// Number of its first photon among all.
+    first: u32,
+    count: u32,
+}
+
+impl<I: Intersect + ?Sized> Batch<'_, I> {
+    fn trace<const N: usize>(&self, map: &mut PhotonMap, progress: &(dyn Fn(u32) + Sync)) {
+        let chunks = self.count.div_ceil(CHUNK);
+        let run = |chunk: u32| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.count);
+            let finished = range.len() as u32;
+            let traced = self.trace_range::<N>(range);
+            progress(finished);
+            traced
+        };
+        #[cfg(feature = "parallel")]
+        let parts: Vec<PhotonMap> = {
+            use rayon::prelude::*;
+            (0..chunks).into_par_iter().map(run).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let parts: Vec<PhotonMap> = (0..chunks).map(run).collect();
+
+        map.photons.reserve(parts.iter().map(|part| part.photons.len()).sum());
+        for mut part in parts {
+            map.photons.append(&mut part.photons);
+            map.ledger.merge(&part.ledger);
+        }
+    }
+
+    fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> PhotonMap {
+        let mut tracer = PathTracer::<I, N>::new(self.world, self.intersect, self.options);
+        for index in range {
+            let sample = self.options.sequence.sample4(index, self.count, self.options.seed);
+            let Some(emission) = self.emitter.emit::<N>(sample, self.count) else {
+                continue;
+            };
+            let mut rng = CounterRng::new(self.options.seed, u64::from(self.first + index));
+            tracer.trace(&emission, self.media, &mut rng);
+        }
+        PhotonMap { photons: tracer.photons, ledger: tracer.ledger }
+    }
+}

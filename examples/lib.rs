@@ -1,0 +1,1 @@
+//! The examples of caustics; see the folder of each.
