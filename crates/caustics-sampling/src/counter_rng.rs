@@ -1,5 +1,7 @@
 use glam::Vec2;
 
+use crate::unit_interval;
+
 /// A random number generator without a history: number `n` of a stream is a hash of the seed, the
 /// stream and `n`.
 ///
@@ -50,7 +52,7 @@ impl CounterRng {
     /// The next number, uniform on the multiples of 2^-24 in `[0, 1)`.
     #[must_use]
     pub const fn next_f32(&mut self) -> f32 {
-        unit_f32(self.next_u32())
+        unit_interval::from_bits(self.next_u32())
     }
 
     /// The next two numbers as a point of the unit square.
@@ -70,11 +72,6 @@ impl CounterRng {
             self.key[3].wrapping_add(counter),
         ])[0]
     }
-}
-
-/// The upper 24 bits as a number in `[0, 1)`: as many as an `f32` holds, so that it is exact.
-pub(crate) const fn unit_f32(bits: u32) -> f32 {
-    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Hashes four words into four.
@@ -102,13 +99,6 @@ pub(crate) const fn pcg4d(words: [u32; 4]) -> [u32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn largest_bits_stay_below_one() {
-        assert_eq!(unit_f32(u32::MAX), 1.0 - f32::EPSILON / 2.0);
-        assert_eq!(unit_f32(0), 0.0);
-        assert_eq!(unit_f32(1 << 31), 0.5);
-    }
 
     #[test]
     fn random_access_equals_drawing_in_order() {

@@ -1,5 +1,7 @@
 use thiserror::Error;
 
+use crate::unit_interval;
+
 /// Why weights make no distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -86,14 +88,14 @@ impl DiscreteDistribution {
     /// a NaN to zero. Entries of weight zero are never drawn.
     #[must_use]
     pub fn sample(&self, u: f32) -> DiscreteSample {
-        let u = f64::from(u.max(0.0).min(1.0 - f32::EPSILON / 2.0));
+        let u = f64::from(unit_interval::nearest(u));
         let index = self.cumulative.partition_point(|&below| below <= u) - 1;
         let (start, end) = (self.cumulative[index], self.cumulative[index + 1]);
         let remapped = ((u - start) / (end - start)) as f32;
         DiscreteSample {
             index,
             probability: (end - start) as f32,
-            remapped: remapped.min(1.0 - f32::EPSILON / 2.0),
+            remapped: unit_interval::nearest(remapped),
         }
     }
 

@@ -1,4 +1,5 @@
-use crate::counter_rng::{pcg4d, unit_f32};
+use crate::counter_rng::pcg4d;
+use crate::unit_interval::from_bits;
 
 /// How many dimensions of the Halton sequence have a prime base of their own.
 pub const HALTON_DIMENSIONS: u32 = 32;
@@ -30,7 +31,7 @@ const RESOLUTION: u32 = 1 << 24;
 pub fn halton(index: u32, dimension: u32) -> f32 {
     match PRIMES.get(dimension as usize) {
         Some(&base) => radical_inverse(index, base),
-        None => unit_f32(pcg4d([index, dimension, 0, 0])[0]),
+        None => from_bits(pcg4d([index, dimension, 0, 0])[0]),
     }
 }
 
@@ -46,7 +47,7 @@ pub fn halton_scrambled(index: u32, dimension: u32, seed: u64) -> f32 {
     let key = [seed as u32, (seed >> 32) as u32, dimension];
     match PRIMES.get(dimension as usize) {
         Some(&base) => scrambled_radical_inverse(index, base, key),
-        None => unit_f32(pcg4d([index, key[0], key[1], key[2]])[0]),
+        None => from_bits(pcg4d([index, key[0], key[1], key[2]])[0]),
     }
 }
 
@@ -62,7 +63,7 @@ pub fn halton_scrambled(index: u32, dimension: u32, seed: u64) -> f32 {
 pub fn radical_inverse(index: u32, base: u32) -> f32 {
     // A constant base lets the compiler replace the divisions.
     match base {
-        0..=2 => unit_f32(index.reverse_bits()),
+        0..=2 => from_bits(index.reverse_bits()),
         3 => mirrored(index, 3),
         5 => mirrored(index, 5),
         7 => mirrored(index, 7),
@@ -128,7 +129,7 @@ mod tests {
 
     #[test]
     fn primes_are_the_first_ones() {
-        let is_prime = |n: u32| n > 1 && (2..n).all(|divisor| n % divisor != 0);
+        let is_prime = |n: u32| n > 1 && (2..n).all(|divisor| !n.is_multiple_of(divisor));
         let expected: Vec<u32> = (2..).filter(|&n| is_prime(n)).take(PRIMES.len()).collect();
         assert_eq!(PRIMES.as_slice(), expected);
     }

@@ -4,6 +4,7 @@ mod apportion;
 mod counter_rng;
 mod discrete;
 mod halton;
+mod unit_interval;
 pub mod warp;
 
 pub use apportion::{ApportionError, apportion, apportion_with_floor};

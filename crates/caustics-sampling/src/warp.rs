@@ -23,6 +23,8 @@ pub use sphere_octahedral::{sphere_octahedral_to_square, square_to_sphere_octahe
 pub use sphere_polar::{sphere_polar_to_square, square_to_sphere_polar};
 pub use triangle::{barycentric_to_square, square_to_barycentric, square_to_triangle};
 
+use crate::unit_interval::nearest;
+
 /// A derivative that would be infinite at a pole is the one at this distance from the pole in the
 /// unit square: half the step of a 24-bit random number.
 pub const POLE_DISTANCE: f32 = f32::EPSILON / 4.0;
@@ -41,13 +43,8 @@ pub struct WarpSample<V> {
     pub d_dv: V,
 }
 
-/// A number of the half-open unit interval: an inverse must not leave it through rounding.
-fn unit(x: f32) -> f32 {
-    x.max(0.0).min(1.0 - f32::EPSILON / 2.0)
-}
-
 /// The angle of a point as a part of a turn, in `[0, 1)`.
 fn turn(point: glam::Vec2) -> f32 {
     let turn = point.y.atan2(point.x) * std::f32::consts::FRAC_1_PI * 0.5;
-    unit(if turn < 0.0 { turn + 1.0 } else { turn })
+    nearest(if turn < 0.0 { turn + 1.0 } else { turn })
 }

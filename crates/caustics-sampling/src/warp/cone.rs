@@ -3,8 +3,10 @@ use std::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3};
 use thiserror::Error;
 
+use crate::unit_interval::nearest;
+
 use super::{
-    POLE_DISTANCE, WarpSample, disc_concentric_to_square, square_to_disc_concentric, turn, unit,
+    POLE_DISTANCE, WarpSample, disc_concentric_to_square, square_to_disc_concentric, turn,
 };
 
 /// The derivative near the pole needs the product of this and [`POLE_DISTANCE`] to be a normal
@@ -151,7 +153,7 @@ impl Cone {
     #[must_use]
     pub fn invert_polar(self, direction: Vec3) -> Vec2 {
         Vec2::new(
-            unit(height_of(direction) / self.height),
+            nearest(height_of(direction) / self.height),
             turn(direction.truncate()),
         )
     }

@@ -2,7 +2,9 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4};
 
 use glam::{Vec2, Vec2Swizzles};
 
-use super::{WarpSample, unit};
+use crate::unit_interval::nearest;
+
+use super::WarpSample;
 
 /// Maps the unit square to the unit disc, concentric squares to circles; density `1/pi`.
 ///
@@ -55,5 +57,5 @@ pub fn disc_concentric_to_square(point: Vec2) -> Vec2 {
     };
     let centred = Vec2::new(radius, radius * angle * (4.0 * FRAC_1_PI));
     let centred = if horizontal { centred } else { centred.yx() };
-    (0.5 * centred + Vec2::splat(0.5)).map(unit)
+    (0.5 * centred + Vec2::splat(0.5)).map(nearest)
 }

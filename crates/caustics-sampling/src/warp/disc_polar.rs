@@ -2,6 +2,8 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::Vec2;
 
+use crate::unit_interval::nearest;
+
 use super::{POLE_DISTANCE, WarpSample, turn};
 
 /// Maps the unit square to the unit disc by radius `sqrt(u)` and angle `2 pi v`; density `1/pi`.
@@ -26,5 +28,5 @@ pub fn square_to_disc_polar(uv: Vec2) -> WarpSample<Vec2> {
 /// The point of the square that [`square_to_disc_polar`] maps to `point`.
 #[must_use]
 pub fn disc_polar_to_square(point: Vec2) -> Vec2 {
-    Vec2::new(super::unit(point.length_squared()), turn(point))
+    Vec2::new(nearest(point.length_squared()), turn(point))
 }

@@ -2,7 +2,9 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4};
 
 use glam::{Vec2, Vec3};
 
-use super::{WarpSample, unit};
+use crate::unit_interval::nearest;
+
+use super::WarpSample;
 
 /// Maps the unit square to the unit sphere by way of an octahedron; density `1/(4 pi)`.
 ///
@@ -65,5 +67,5 @@ pub fn sphere_octahedral_to_square(direction: Vec3) -> Vec2 {
     } else {
         Vec2::new(1.0 - q, 1.0 - p)
     };
-    (0.5 * folded.copysign(direction.truncate()) + Vec2::splat(0.5)).map(unit)
+    (0.5 * folded.copysign(direction.truncate()) + Vec2::splat(0.5)).map(nearest)
 }

@@ -1,6 +1,8 @@
 use glam::{Vec2, Vec3};
 
-use super::{WarpSample, unit};
+use crate::unit_interval::nearest;
+
+use super::WarpSample;
 
 /// Maps the unit square to barycentric coordinates `(b, c)` with `b, c, 1 - b - c >= 0`; density 2.
 ///
@@ -32,7 +34,7 @@ pub fn barycentric_to_square(point: Vec2) -> Vec2 {
     } else {
         Vec2::new(point.x + point.y, 2.0 * point.y)
     };
-    square.map(unit)
+    square.map(nearest)
 }
 
 /// Maps the unit square to a triangle in space, density `1 / area` (infinite for area zero).
