@@ -19,19 +19,36 @@ pub struct Ray {
 impl Ray {
     /// A ray without a far limit.
     #[must_use]
-    pub const fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
+    pub fn new(origin: impl Into<Vec3>, direction: impl Into<Vec3>) -> Self {
+        Self::with_range(origin, direction, 0.0, f32::INFINITY)
     }
 
     /// A ray whose hits must lie strictly between `t_min` and `t_max`.
     #[must_use]
-    pub const fn with_range(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
-        Self { origin, direction, t_min, t_max }
+    pub fn with_range(
+        origin: impl Into<Vec3>,
+        direction: impl Into<Vec3>,
+        t_min: f32,
+        t_max: f32,
+    ) -> Self {
+        Self {
+            origin: origin.into(),
+            direction: direction.into(),
+            t_min,
+            t_max,
+        }
     }
 
     /// The point at parameter `t`.
     #[must_use]
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + t * self.direction
+    }
+
+    /// Whether a hit at parameter `t` counts; false for NaN.
+    #[inline]
+    #[must_use]
+    pub fn contains(&self, t: f32) -> bool {
+        self.t_min < t && t < self.t_max
     }
 }
