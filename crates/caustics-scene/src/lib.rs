@@ -1,1 +1,17 @@
-//! To be written.
+//! Materials, lights, cameras and scenes.
+
+mod area_light;
+mod camera;
+mod light;
+mod material;
+mod scene;
+mod surface_point;
+mod world;
+
+pub use area_light::AreaLight;
+pub use camera::{Camera, CameraError, Projection};
+pub use light::{Light, LightError};
+pub use material::{MAX_ATTENUATION, Material, MaterialError, Surface};
+pub use scene::{Instance, MaterialId, MeshId, Scene, SceneError, Shape};
+pub use surface_point::SurfacePoint;
+pub use world::{Object, World};
