@@ -125,17 +125,8 @@ impl Arguments {
                     choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
             }
             "kernel" => {
-                self.caustics.nearest.kernel = choice(
-                    name,
-                    parser,
-                    &[
-                        ("box", Kernel::Box),
-                        ("cone", Kernel::Cone),
-                        ("epanechnikov", Kernel::Epanechnikov),
-                        ("gaussian", Kernel::Gaussian),
-                        ("silverman", Kernel::Silverman),
-                    ],
-                )?;
+                let kernels = Kernel::ALL.map(|it| (it.name(), it));
+                self.caustics.nearest.kernel = choice(name, parser, &kernels)?;
             }
             "branching" => {
                 trace.branching = choice(

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use caustics::filter::{Image, PngOptions};
+use caustics::filter::{Display, write_exr, write_png};
 use caustics::prelude::*;
 use caustics::scene::{builtin, gltf};
 
@@ -106,16 +106,15 @@ fn load(path: Option<&Path>) -> Result<(String, Scene), Failure> {
 }
 
 fn write(arguments: &Arguments, picture: &Picture) -> Result<(), Failure> {
-    let sum = picture.direct.sum(&picture.caustics).map_err(|error| error.to_string())?;
-    let options = PngOptions { exposure: arguments.exposure, ..PngOptions::default() };
-    sum.write_png(&arguments.out, &options).map_err(|error| error.to_string())?;
+    let display = Display { exposure_ev: arguments.exposure, ..Display::default() };
+    write_png(&arguments.out, &picture.total(), &display).map_err(|error| error.to_string())?;
     let exrs: [(&Option<_>, &Image); 2] = [
         (&arguments.caustics_only, &picture.caustics),
         (&arguments.direct_only, &picture.direct),
     ];
     for (path, image) in exrs {
         if let Some(path) = path {
-            image.write_exr(path).map_err(|error| error.to_string())?;
+            write_exr(path, image).map_err(|error| error.to_string())?;
         }
     }
     Ok(())

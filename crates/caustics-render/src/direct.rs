@@ -4,7 +4,7 @@ use caustics_accel::Intersect;
 use caustics_geometry::Ray;
 use caustics_sampling::CounterRng;
 use caustics_scene::{AreaLight, Light, World};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::eye::Receiver;
 
@@ -36,7 +36,7 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         for light in self.world.lights() {
             irradiance += self.from_light(receiver, light);
         }
-        for light in self.world.area_lights() {
+        for light in self.world.emitters() {
             irradiance += self.from_area(receiver, light, rng);
         }
         receiver.albedo * FRAC_1_PI * irradiance
@@ -65,22 +65,26 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
     }
 
     fn from_area(&self, receiver: &Receiver, light: &AreaLight, rng: &mut CounterRng) -> Vec3 {
-        let (on_light, normal) = light.sample_position(self.world, rng.next_vec2());
-        let to_light = on_light - receiver.point.spawn.position;
+        let sample = rng.next_vec2();
+        let (primitive, along) = light.choose(sample.x);
+        let Some(on_light) = self.world.point_on(primitive, Vec2::new(along, sample.y)) else {
+            return Vec3::ZERO;
+        };
+        let to_light = on_light.spawn.position - receiver.point.spawn.position;
         let distance = to_light.length();
         if distance <= 0.0 {
             return Vec3::ZERO;
         }
         let direction = to_light / distance;
-        let mut leaving = -direction.dot(normal);
-        if light.double_sided {
+        let mut leaving = -direction.dot(on_light.geometric_normal);
+        if light.double_sided() {
             leaving = leaving.abs();
         }
         let cosine = self.cosine(receiver, direction);
         if leaving <= 0.0 || cosine <= 0.0 || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        light.radiance * (light.area * leaving * cosine / (distance * distance))
+        light.radiance() * (light.area() * leaving * cosine / (distance * distance))
     }
 
     /// The cosine of the incident light, 0 if it does not reach the side that is seen. The smooth

@@ -1,4 +1,5 @@
 use caustics_accel::AccelError;
+use caustics_filter::ImageError;
 use thiserror::Error;
 
 /// What can be wrong with a picture's or an estimate's input.
@@ -30,4 +31,7 @@ pub enum RenderError {
     /// A structure that photons are found with could not be built.
     #[error(transparent)]
     Accel(#[from] AccelError),
+    /// The picture's memory could not be had.
+    #[error(transparent)]
+    Image(#[from] ImageError),
 }

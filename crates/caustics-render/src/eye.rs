@@ -89,14 +89,18 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
         visit: &mut impl FnMut(&Receiver, &mut CounterRng),
     ) -> Vec3 {
         self.rays += 1;
-        let Some(hit) = self.intersect.closest_hit(&branch.ray) else {
+        let hit = self.intersect.closest_hit(&branch.ray);
+        let Some((hit, point)) =
+            hit.and_then(|hit| Some((hit, self.world.surface(&branch.ray, &hit)?)))
+        else {
             return Vec3::ZERO;
         };
-        let point = self.world.surface(&branch.ray, &hit);
+        let material = &self.world.materials()[point.material as usize];
         branch.weight *= beer_lambert(branch.media.attenuation(self.world), hit.t);
         branch.depth += 1;
-        let emitted = branch.weight * self.world.emitted_radiance(&point);
-        match *self.world.surface_of(point.object) {
+        let emits = point.from_outside || material.double_sided;
+        let emitted = if emits { branch.weight * material.emission } else { Vec3::ZERO };
+        match material.surface {
             Surface::Diffuse { albedo } => {
                 let side = if point.from_outside { 1.0 } else { -1.0 };
                 let receiver = Receiver {

@@ -86,6 +86,18 @@ pub struct Picture {
     pub rays: u64,
 }
 
+impl Picture {
+    /// Direct light and caustics together.
+    #[must_use]
+    pub fn total(&self) -> Image {
+        let mut total = self.direct.clone();
+        for (pixel, caustic) in total.pixels_mut().iter_mut().zip(self.caustics.pixels()) {
+            *pixel = std::array::from_fn(|channel| pixel[channel] + caustic[channel]);
+        }
+        total
+    }
+}
+
 /// Renders direct light and, where photons are given, their caustics.
 ///
 /// `progress` is called with the number of rows that have just been finished, from any thread.
@@ -124,13 +136,14 @@ pub fn render<I: Intersect + ?Sized>(
     let rows: Vec<Row> = (0..options.height).map(finish).collect();
 
     let mut picture = Picture {
-        direct: Image::black(options.width, options.height)?,
-        caustics: Image::black(options.width, options.height)?,
+        direct: Image::new(options.width, options.height)?,
+        caustics: Image::new(options.width, options.height)?,
         rays: 0,
     };
-    for (y, row) in rows.into_iter().enumerate() {
-        picture.direct.row_mut(y as u32).copy_from_slice(&row.direct);
-        picture.caustics.row_mut(y as u32).copy_from_slice(&row.caustics);
+    let targets = picture.direct.rows_mut().zip(picture.caustics.rows_mut());
+    for (row, (direct, caustics)) in rows.into_iter().zip(targets) {
+        direct.copy_from_slice(&row.direct);
+        caustics.copy_from_slice(&row.caustics);
         picture.rays += row.rays;
     }
     Ok(picture)
@@ -169,7 +182,7 @@ impl<I: Intersect + ?Sized> RowRenderer<'_, I> {
                     options.width,
                     options.height,
                 );
-                direct += eye.trace(ray, self.media, &mut rng, |receiver, rng| {
+                let emitted = eye.trace(ray, self.media, &mut rng, |receiver, rng| {
                     direct += receiver.weight * direct_light.radiance(receiver, rng);
                     let counts =
                         receiver.seen_directly || options.visibility == Visibility::Full;
@@ -177,6 +190,7 @@ impl<I: Intersect + ?Sized> RowRenderer<'_, I> {
                         caustics += receiver.weight * estimate.radiance(receiver, &mut scratch);
                     }
                 });
+                direct += emitted;
             }
             let scale = 1.0 / options.samples as f32;
             row.direct.push((direct * scale).to_array());

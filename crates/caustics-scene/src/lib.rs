@@ -4,6 +4,7 @@ mod area_light;
 mod camera;
 mod light;
 mod material;
+mod point_on;
 mod scene;
 mod surface_point;
 mod world;

@@ -57,7 +57,8 @@ struct Medium {
 
 impl Medium {
     fn of(world: &World, object: u32) -> Option<Self> {
-        match *world.surface_of(object) {
+        let material = world.objects().get(object as usize)?.material;
+        match world.materials().get(material as usize)?.surface {
             Surface::Dielectric { ior, attenuation, dispersion, priority } => {
                 Some(Self { priority, ior, dispersion, attenuation })
             }
@@ -97,7 +98,9 @@ impl MediumStack {
             let Some(hit) = intersect.closest_hit(&ray) else {
                 break;
             };
-            let surface = world.surface(&ray, &hit);
+            let Some(surface) = world.surface(&ray, &hit) else {
+                break;
+            };
             if !seen.contains(&surface.object) {
                 seen.push(surface.object);
                 if !surface.from_outside && Medium::of(world, surface.object).is_some() {

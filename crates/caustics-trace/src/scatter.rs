@@ -68,7 +68,7 @@ pub fn scatter(
 ) -> Option<Scattering> {
     let side = if point.from_outside { 1.0 } else { -1.0 };
     let normals = Normals::facing(side * point.geometric_normal, side * point.shading_normal, direction);
-    match *world.surface_of(point.object) {
+    match world.materials()[point.material as usize].surface {
         Surface::Dielectric { .. } => {
             match media.cross(world, point.object, point.from_outside, channel) {
                 Crossing::Through(media) => Some(passage(direction, &normals, media)),

@@ -85,7 +85,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             self.ledger.book(fate, branch.flux);
             return;
         };
-        let point = self.world.surface(&branch.ray, &hit);
+        let Some(point) = self.world.surface(&branch.ray, &hit) else {
+            self.ledger.book(Fate::Invalid, branch.flux);
+            return;
+        };
         self.absorb(&mut branch, hit.t);
         branch.differential = branch.differential.transferred(
             branch.ray.direction,
@@ -117,7 +120,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
 
     fn disperses(&self, point: &SurfacePoint) -> bool {
         matches!(
-            *self.world.surface_of(point.object),
+            self.world.materials()[point.material as usize].surface,
             Surface::Dielectric { dispersion, .. } if dispersion > 0.0
         )
     }
@@ -242,7 +245,8 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         let direction = branch.ray.direction;
         let normal_change = if outgoing.interpolated {
             let side = if point.from_outside { 1.0 } else { -1.0 };
-            before.position.map(|moved| side * self.world.shading_normal_change(point, moved))
+            let jacobian = self.world.normal_jacobian(point);
+            before.position.map(|moved| side * (jacobian * moved))
         } else {
             [Vec3::ZERO; N]
         };
