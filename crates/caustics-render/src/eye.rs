@@ -9,7 +9,7 @@ use glam::Vec3;
 const MIN_WEIGHT: f32 = 0.02;
 
 /// A receiver that an eye path reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Receiver {
     /// The point on the surface.
     pub point: SurfacePoint,

@@ -1,4 +1,4 @@
-use caustics_geometry::SpawnPoint;
+use caustics_geometry::{SpawnPoint, Triangle};
 use glam::{Vec2, Vec3};
 
 use crate::{SurfacePoint, World};
@@ -15,7 +15,7 @@ impl World {
         let object = self.object_of(primitive)?;
         let material = self.objects()[object as usize].material;
         let (spawn, geometric_normal, u, v) =
-            if let Some([a, b, c]) = self.triangle_positions(primitive) {
+            if let Some(Triangle { a, b, c }) = self.triangle(primitive) {
                 let normal = (b - a).cross(c - a).try_normalize()?;
                 let root = sample.x.clamp(0.0, 1.0).sqrt();
                 let (u, v) = (root * (1.0 - sample.y), root * sample.y);

@@ -1,5 +1,5 @@
 use caustics_accel::Intersect;
-use caustics_sampling::{CounterRng, apportion};
+use caustics_sampling::{CounterRng, PointSet, apportion};
 use caustics_scene::World;
 
 use crate::emission::Emitter;
@@ -96,8 +96,9 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
 
     fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> PhotonMap {
         let mut tracer = PathTracer::<I, N>::new(self.world, self.intersect, self.options);
+        let points = PointSet::new(self.options.sequence, self.count, self.options.seed);
         for index in range {
-            let sample = self.options.sequence.sample4(index, self.count, self.options.seed);
+            let sample = std::array::from_fn(|dimension| points.sample(index, dimension as u32));
             let Some(emission) = self.emitter.emit::<N>(sample, self.count) else {
                 continue;
             };
