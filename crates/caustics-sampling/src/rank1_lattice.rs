@@ -5,15 +5,14 @@ use crate::unit_interval::nearest;
 /// `1 / phi` of the golden ratio, the number that fractions approach worst.
 const INVERSE_GOLDEN_RATIO: f64 = 0.618_033_988_749_894_9;
 
-/// Generators tried on either side of `count / phi`. With this many the least distance found stays
-/// above 0.9 of a square grid's.
+/// Generators tried on either side of `count / phi`: enough for the distance that
+/// [`Rank1Lattice::fibonacci`] promises.
 const SEARCH: i64 = 48;
 
 /// A rank-1 lattice: points `(i, i g) / N + 1 / (2 N)` modulo one, for a generator `g`.
 ///
 /// It is a lattice on the torus, without rows along the axes: each coordinate takes every value
-/// `(k + 1/2) / N` once (if `g` and `N` have no common factor), which a square grid's do not, and
-/// neighbours lie farther apart than the grid's for the best `N`.
+/// `(k + 1/2) / N` once, where a square grid's have `sqrt(N)` values only.
 ///
 /// ```
 /// use caustics_sampling::Rank1Lattice;
@@ -35,9 +34,12 @@ pub struct Rank1Lattice {
 impl Rank1Lattice {
     /// The Fibonacci lattice, extended to any number of points.
     ///
-    /// For `N` a Fibonacci number the generator is the one before it (Niederreiter and Sloan 1994).
-    /// For any other, generators about `N / phi` are tried, and the one whose lattice has the
-    /// farthest nearest neighbours is taken. A count of zero is taken as one.
+    /// For `N` a Fibonacci number the generator of the lattice is the one before it (Niederreiter
+    /// and Sloan 1994). Here generators about `N / phi` that have no factor in common with `N` are
+    /// tried, and the one whose lattice has the farthest nearest neighbours is taken, which for
+    /// some Fibonacci numbers is a slightly better one. From 57 points on neighbours are at least
+    /// `0.86 / sqrt(N)` apart, below that at least `0.57 / sqrt(N)`; a square grid has 1. A count
+    /// of zero is taken as one.
     #[must_use]
     pub fn fibonacci(count: u32) -> Self {
         let count = count.max(1);
@@ -106,31 +108,27 @@ fn greatest_common_divisor(a: u32, b: u32) -> u32 {
     }
 }
 
-fn squared_length((x, y): (i64, i64)) -> i64 {
-    x * x + y * y
-}
-
 /// The shortest basis of the lattice of `(1, generator)` and `(0, count)`, by Lagrange's reduction.
 ///
-/// Products stay below 2^65 only for the first step's pair of long vectors, hence 128 bits there.
+/// The first vectors may have 2^32 on either axis, so that products want more than 64 bits.
 fn reduced_basis(count: i64, generator: i64) -> [(i64, i64); 2] {
     let (mut long, mut short) = ((0, count), (1, generator));
-    if squared_wide(long) < squared_wide(short) {
+    if squared_length(long) < squared_length(short) {
         std::mem::swap(&mut long, &mut short);
     }
     loop {
         let product =
             i128::from(long.0) * i128::from(short.0) + i128::from(long.1) * i128::from(short.1);
-        let multiple = rounded_quotient(product, squared_wide(short));
+        let multiple = rounded_quotient(product, squared_length(short));
         long = (long.0 - multiple * short.0, long.1 - multiple * short.1);
-        if squared_wide(long) >= squared_wide(short) {
+        if squared_length(long) >= squared_length(short) {
             return [short, long];
         }
         std::mem::swap(&mut long, &mut short);
     }
 }
 
-fn squared_wide((x, y): (i64, i64)) -> i128 {
+fn squared_length((x, y): (i64, i64)) -> i128 {
     i128::from(x) * i128::from(x) + i128::from(y) * i128::from(y)
 }
 
