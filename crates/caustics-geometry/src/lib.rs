@@ -2,10 +2,14 @@
 
 mod aabb;
 mod barycentric;
+mod frame;
 mod hit;
 mod mesh;
+mod normal_derivative;
+mod plane;
 mod precomputed_triangle;
 mod ray;
+pub mod shapes;
 mod spawn;
 mod sphere;
 mod triangle;
@@ -14,9 +18,12 @@ mod watertight;
 
 pub use aabb::Aabb;
 pub use barycentric::{BarycentricGradient, interpolate};
+pub use frame::Frame;
 pub use glam;
 pub use hit::Hit;
 pub use mesh::{MeshError, TriangleMesh};
+pub use normal_derivative::NormalGradient;
+pub use plane::{Plane, PlaneError};
 pub use precomputed_triangle::PrecomputedTriangle;
 pub use ray::Ray;
 pub use spawn::SpawnPoint;

@@ -1,4 +1,4 @@
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::{Aabb, Ray};
@@ -69,9 +69,7 @@ impl Sphere {
     pub fn normal_at(&self, point: Vec3) -> Vec3 {
         // In f64, since the difference to a far center loses most of its digits in f32.
         let outward = point.as_dvec3() - self.center.as_dvec3();
-        outward
-            .try_normalize()
-            .map_or(Vec3::Y, |normal| normal.as_vec3())
+        outward.try_normalize().unwrap_or(DVec3::Y).as_vec3()
     }
 
     /// The nearest parameter at which the ray meets the surface within its range: the near side
@@ -103,8 +101,7 @@ impl Sphere {
         let b = -from_center.dot(direction);
         let nearest = from_center + b / a * direction;
         let discriminant = radius * radius - nearest.length_squared();
-        // Also catches the NaN of a zero direction.
-        if !(discriminant >= 0.0) {
+        if discriminant < 0.0 || discriminant.is_nan() {
             return None;
         }
         let q = b + (a * discriminant).sqrt().copysign(b);
