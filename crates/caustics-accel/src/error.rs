@@ -1,0 +1,59 @@
+/// Why an acceleration structure could not be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AccelError {
+    /// A point has a NaN or infinite coordinate.
+    #[error("point {point} is not finite")]
+    NonFinitePoint {
+        /// Index of the first such point.
+        point: usize,
+    },
+    /// More points than an index can number.
+    #[error("{count} points are more than the limit of {limit}")]
+    TooManyPoints {
+        /// Points given.
+        count: usize,
+        /// The most that fit.
+        limit: usize,
+    },
+    /// A search radius or cell size is not a positive, finite number.
+    #[error("cell size {size} is not positive and finite")]
+    InvalidCellSize {
+        /// The size given, in metres.
+        size: f32,
+    },
+    /// A vertex has a NaN or infinite coordinate.
+    #[error("vertex {vertex} is not finite")]
+    NonFiniteVertex {
+        /// Index of the first such vertex.
+        vertex: usize,
+    },
+    /// A vertex is so far away that products of three coordinates would overflow.
+    #[error("vertex {vertex} has a coordinate of {coordinate}, beyond the limit of {limit}")]
+    VertexTooFar {
+        /// Index of the first such vertex.
+        vertex: usize,
+        /// Its largest coordinate, in metres.
+        coordinate: f32,
+        /// The largest magnitude allowed, in metres.
+        limit: f32,
+    },
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to vertex {vertex}, but there are only {vertices}")]
+    VertexOutOfRange {
+        /// Index of the first such triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// More triangles than an index can number.
+    #[error("{count} triangles are more than the limit of {limit}")]
+    TooManyTriangles {
+        /// Triangles given.
+        count: usize,
+        /// The most that fit.
+        limit: usize,
+    },
+}

@@ -1,0 +1,141 @@
+//! Arithmetic on eight lanes at once, so that the traversal is written only once.
+
+use super::layout::{Row, WIDTH};
+
+/// A set of eight-lane instructions.
+///
+/// Every implementation rounds each operation as IEEE 754 demands and none contracts a product and
+/// a sum, so that all of them return the same bits.
+pub(super) trait Lanes: Copy {
+    /// One float for each lane.
+    type Floats: Copy;
+    /// One yes or no for each lane.
+    type Mask: Copy;
+
+    fn load(self, row: &Row) -> Self::Floats;
+    fn store(self, a: Self::Floats) -> Row;
+    fn splat(self, a: f32) -> Self::Floats;
+    fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    fn sub(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    fn div(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// The lesser one; `b` where either is NaN.
+    fn min(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// The greater one; `b` where either is NaN.
+    fn max(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// Where `a` is less than `b`; no where either is NaN.
+    fn less(self, a: Self::Floats, b: Self::Floats) -> Self::Mask;
+    /// Where `a` is at most `b`; no where either is NaN.
+    fn at_most(self, a: Self::Floats, b: Self::Floats) -> Self::Mask;
+    fn and(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    fn or(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Lane 0 in the lowest bit.
+    fn bits(self, mask: Self::Mask) -> u32;
+}
+
+/// Plain arrays, which the compiler turns into whatever the target has (SSE2, NEON).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Portable;
+
+#[inline(always)]
+fn zip(a: Row, b: Row, f: impl Fn(f32, f32) -> f32) -> Row {
+    let mut out = [0.0; WIDTH];
+    for lane in 0..WIDTH {
+        out[lane] = f(a[lane], b[lane]);
+    }
+    out
+}
+
+#[inline(always)]
+fn compare(a: Row, b: Row, f: impl Fn(f32, f32) -> bool) -> [u32; WIDTH] {
+    let mut out = [0; WIDTH];
+    for lane in 0..WIDTH {
+        out[lane] = if f(a[lane], b[lane]) { u32::MAX } else { 0 };
+    }
+    out
+}
+
+impl Lanes for Portable {
+    type Floats = Row;
+    type Mask = [u32; WIDTH];
+
+    #[inline(always)]
+    fn load(self, row: &Row) -> Row {
+        *row
+    }
+
+    #[inline(always)]
+    fn store(self, a: Row) -> Row {
+        a
+    }
+
+    #[inline(always)]
+    fn splat(self, a: f32) -> Row {
+        [a; WIDTH]
+    }
+
+    #[inline(always)]
+    fn add(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn min(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, a: Row, b: Row) -> Row {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn less(self, a: Row, b: Row) -> [u32; WIDTH] {
+        compare(a, b, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: Row, b: Row) -> [u32; WIDTH] {
+        compare(a, b, |a, b| a <= b)
+    }
+
+    #[inline(always)]
+    fn and(self, mut a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a &= b;
+        }
+        a
+    }
+
+    #[inline(always)]
+    fn or(self, mut a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a |= b;
+        }
+        a
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: [u32; WIDTH]) -> u32 {
+        let mut bits = 0;
+        for (lane, yes) in mask.into_iter().enumerate() {
+            bits |= yes & (1 << lane);
+        }
+        bits
+    }
+}

@@ -1,0 +1,127 @@
+//! How the tree lies in memory.
+
+use bytemuck::Zeroable;
+
+/// Children of a node and triangles of a block: one for each SIMD lane.
+pub(super) const WIDTH: usize = 8;
+
+/// One number for each lane.
+pub(super) type Row = [f32; WIDTH];
+
+/// An inner node: the bounding boxes of up to eight children, one to a lane.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// For each axis the lower and the upper bounds. An unused lane has an empty box, which no ray
+    /// meets.
+    pub(super) bounds: [[Row; 2]; 3],
+    pub(super) children: [Child; WIDTH],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        bounds: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
+        children: [Child::EMPTY; WIDTH],
+    };
+
+    pub(super) fn set(&mut self, lane: usize, low: [f32; 3], high: [f32; 3], child: Child) {
+        for axis in 0..3 {
+            self.bounds[axis][0][lane] = low[axis];
+            self.bounds[axis][1][lane] = high[axis];
+        }
+        self.children[lane] = child;
+    }
+}
+
+/// Where a child is: a node, or a run of blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Zeroable)]
+#[repr(transparent)]
+pub(super) struct Child(pub(super) u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+    const COUNT_BITS: u32 = 3;
+    /// The most blocks in one leaf.
+    pub(super) const MAX_BLOCKS: usize = (1 << Self::COUNT_BITS) - 1;
+    /// The most blocks in a tree, and more than the nodes above them.
+    pub(super) const MAX_BLOCK: usize = 1 << (31 - Self::COUNT_BITS);
+
+    /// A leaf without blocks.
+    pub(super) const EMPTY: Self = Self(Self::LEAF);
+
+    pub(super) fn node(index: usize) -> Self {
+        Self(index as u32)
+    }
+
+    pub(super) fn leaf(first_block: usize, blocks: usize) -> Self {
+        Self(Self::LEAF | ((first_block as u32) << Self::COUNT_BITS) | blocks as u32)
+    }
+
+    #[inline(always)]
+    pub(super) fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    /// Index of the node, if this is none of a leaf.
+    #[inline(always)]
+    pub(super) fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// The leaf's blocks.
+    #[inline(always)]
+    pub(super) fn blocks(self) -> std::ops::Range<usize> {
+        let first = ((self.0 & !Self::LEAF) >> Self::COUNT_BITS) as usize;
+        first..first + (self.0 as usize & Self::MAX_BLOCKS)
+    }
+}
+
+/// Up to eight triangles of a leaf, one to a lane.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    /// By vertex, then by axis. An unused lane is NaN, which no ray meets.
+    pub(super) vertices: [[Row; 3]; 3],
+    /// Indices in the caller's triangle list.
+    pub(super) primitives: [u32; WIDTH],
+}
+
+impl Block {
+    pub(super) const EMPTY: Self = Self {
+        vertices: [[[f32::NAN; WIDTH]; 3]; 3],
+        primitives: [u32::MAX; WIDTH],
+    };
+
+    pub(super) fn set(&mut self, lane: usize, triangle: [[f32; 3]; 3], primitive: u32) {
+        for (rows, vertex) in self.vertices.iter_mut().zip(triangle) {
+            for (row, coordinate) in rows.iter_mut().zip(vertex) {
+                row[lane] = coordinate;
+            }
+        }
+        self.primitives[lane] = primitive;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_and_blocks_fill_whole_cache_lines() {
+        assert_eq!(size_of::<Node>(), 256);
+        assert_eq!(size_of::<Block>(), 320);
+    }
+
+    #[test]
+    fn children_remember_what_they_are() {
+        assert_eq!(Child::node(77).index(), 77);
+        assert!(!Child::node(77).is_leaf());
+        let last = Child::MAX_BLOCK - 1;
+        for (first, blocks) in [(0, 1), (12_345, 7), (last, 3)] {
+            let leaf = Child::leaf(first, blocks);
+            assert!(leaf.is_leaf());
+            assert_eq!(leaf.blocks(), first..first + blocks);
+        }
+        assert!(Child::EMPTY.blocks().is_empty());
+    }
+}

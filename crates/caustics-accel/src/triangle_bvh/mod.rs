@@ -1,0 +1,298 @@
+mod avx2;
+mod binary_tree;
+mod collapse;
+mod lanes;
+mod layout;
+mod traverse;
+
+use caustics_geometry::glam::{Vec3, Vec3A};
+use caustics_geometry::{Aabb, Hit, Ray};
+
+use self::binary_tree::{BinaryTree, TriangleBounds};
+use self::collapse::{WideTree, collapse};
+use self::lanes::Portable;
+use self::layout::{Block, Child, Node};
+use self::traverse::{MAX_DEPTH, Tree};
+use crate::{AccelError, Intersect};
+
+/// How much time to spend on building for the sake of tracing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum BvhPreset {
+    /// For meshes rebuilt in every frame.
+    FastestBuild,
+    /// Nearly as fast to build, and faster to trace.
+    FastBuild,
+    /// What most of the trace speed costs.
+    #[default]
+    Balanced,
+    /// For meshes that never change: several times longer to build, a few per cent to gain.
+    FastTrace,
+}
+
+/// Which processor instructions to trace with. All of them return the same bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Instructions {
+    /// The widest that this processor has, found out when the tree is built.
+    #[default]
+    Detect,
+    /// Only what the program was compiled for.
+    Portable,
+}
+
+/// Settings of [`TriangleBvh::new`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BvhOptions {
+    /// Build time against trace time.
+    pub preset: BvhPreset,
+    /// Processor instructions to trace with.
+    pub instructions: Instructions,
+}
+
+/// A bounding volume hierarchy over triangles, watertight and fast.
+///
+/// Each node has up to eight children and each leaf up to eight triangles, so that a ray is tested
+/// against eight of them at once, with AVX2 where the processor has it.
+///
+/// A ray aimed at an edge or a vertex that triangles share hits one of them, always: the triangle
+/// test is that of Woop, Benthin and Wald (*Watertight Ray/Triangle Intersection*, JCGT 2013), and
+/// no box that holds the triangle is missed by rounding. Triangles have two sides. Of hits at the
+/// same parameter the triangle with the lowest index wins.
+///
+/// # Limits
+/// Coordinates of vertices and of ray origins up to [`TriangleBvh::MAX_COORDINATE`]; directions
+/// of a length between 1e-10 and 1e10; hits behind the origin never count, also with a negative
+/// `t_min`. A ray with a NaN or an infinite coordinate hits nothing.
+#[derive(Clone, Debug)]
+pub struct TriangleBvh {
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+    root: Child,
+    bounds: Aabb,
+    triangles: usize,
+    /// Those that can be hit.
+    stored: usize,
+    instructions: Chosen,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Chosen {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(avx2::Avx2),
+}
+
+impl Chosen {
+    fn new(instructions: Instructions) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if instructions == Instructions::Detect
+            && let Some(avx2) = avx2::Avx2::detect()
+        {
+            return Self::Avx2(avx2);
+        }
+        Self::Portable
+    }
+}
+
+impl TriangleBvh {
+    /// The largest magnitude of a vertex coordinate, in metres: products of three of them fit an
+    /// f32.
+    pub const MAX_COORDINATE: f32 = 1e11;
+
+    /// The most triangles that a tree takes.
+    pub const MAX_TRIANGLES: usize = Child::MAX_BLOCK;
+
+    /// Builds a tree over triangles given as three indices into `positions` each.
+    ///
+    /// A hit's `primitive` is an index into `triangles`. The result does not depend on the number
+    /// of threads.
+    ///
+    /// # Errors
+    /// [`AccelError::NonFiniteVertex`], [`AccelError::VertexTooFar`],
+    /// [`AccelError::VertexOutOfRange`] or [`AccelError::TooManyTriangles`].
+    pub fn new<P: Copy + Into<Vec3>>(
+        positions: &[P],
+        triangles: &[[u32; 3]],
+        options: &BvhOptions,
+    ) -> Result<Self, AccelError> {
+        validate(positions, triangles)?;
+        let corners = |triangle: u32| {
+            triangles[triangle as usize].map(|vertex| {
+                let position: Vec3 = positions[vertex as usize].into();
+                position.to_array()
+            })
+        };
+        let boxes: Vec<TriangleBounds> = (0..triangles.len() as u32)
+            .filter_map(|triangle| {
+                let [a, b, c] = corners(triangle).map(Vec3A::from);
+                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+                // A triangle that is a line along an axis or a point cannot be hit.
+                let is_flat = (high - low).cmpgt(Vec3A::ZERO).bitmask().count_ones() < 2;
+                (!is_flat).then_some(TriangleBounds {
+                    low,
+                    high,
+                    triangle,
+                })
+            })
+            .collect();
+        let mut wide = collapse(&BinaryTree::clustered(&boxes, options.preset), corners);
+        if wide.depth > MAX_DEPTH {
+            wide = collapse(&BinaryTree::halved(&boxes), corners);
+        }
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, bounds| {
+            all.extend(Vec3::from(bounds.low))
+                .extend(Vec3::from(bounds.high))
+        });
+        let WideTree {
+            nodes,
+            blocks,
+            root,
+            depth: _,
+        } = wide;
+        let instructions = Chosen::new(options.instructions);
+        let tree = Self {
+            nodes,
+            blocks,
+            root,
+            bounds,
+            triangles: triangles.len(),
+            stored: boxes.len(),
+            instructions,
+        };
+        debug_assert!(tree.is_valid());
+        Ok(tree)
+    }
+
+    /// How many triangles the tree holds.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.triangles
+    }
+
+    /// Whether the tree holds no triangle.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.triangles == 0
+    }
+
+    /// The box around all triangles that can be hit: those of no area may lie outside.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Memory that the tree occupies, in bytes.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.nodes.capacity() * size_of::<Node>()
+            + self.blocks.capacity() * size_of::<Block>()
+    }
+
+    fn tree(&self) -> Tree<'_> {
+        Tree {
+            nodes: &self.nodes,
+            blocks: &self.blocks,
+            root: self.root,
+        }
+    }
+
+    /// Whether every triangle that can be hit occurs once and lies within all the boxes above it.
+    fn is_valid(&self) -> bool {
+        let mut seen = vec![false; self.triangles];
+        let mut waiting = vec![(self.root, self.bounds)];
+        while let Some((child, bounds)) = waiting.pop() {
+            if child.is_leaf() {
+                for block in &self.blocks[child.blocks()] {
+                    for (lane, &primitive) in block.primitives.iter().enumerate() {
+                        if primitive == u32::MAX {
+                            continue;
+                        }
+                        let inside = block.vertices.iter().all(|rows| {
+                            bounds.contains(Vec3::from_array(rows.map(|row| row[lane])))
+                        });
+                        if !inside || std::mem::replace(&mut seen[primitive as usize], true) {
+                            return false;
+                        }
+                    }
+                }
+            } else {
+                let node = &self.nodes[child.index()];
+                for (lane, &child) in node.children.iter().enumerate() {
+                    let side =
+                        |side: usize| Vec3::from_array(node.bounds.map(|axis| axis[side][lane]));
+                    let child_bounds = Aabb {
+                        min: side(0),
+                        max: side(1),
+                    };
+                    if child != Child::EMPTY {
+                        if bounds.union(&child_bounds) != bounds {
+                            return false;
+                        }
+                        waiting.push((child, child_bounds));
+                    }
+                }
+            }
+        }
+        seen.into_iter().filter(|seen| *seen).count() == self.stored
+    }
+}
+
+impl Intersect for TriangleBvh {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        match self.instructions {
+            Chosen::Portable => traverse::closest_hit(Portable, self.tree(), ray),
+            #[cfg(target_arch = "x86_64")]
+            Chosen::Avx2(avx2) => avx2::closest_hit(avx2, self.tree(), ray),
+        }
+    }
+
+    fn is_occluded(&self, ray: &Ray) -> bool {
+        match self.instructions {
+            Chosen::Portable => traverse::is_occluded(Portable, self.tree(), ray),
+            #[cfg(target_arch = "x86_64")]
+            Chosen::Avx2(avx2) => avx2::is_occluded(avx2, self.tree(), ray),
+        }
+    }
+}
+
+fn validate<P: Copy + Into<Vec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+) -> Result<(), AccelError> {
+    if triangles.len() > TriangleBvh::MAX_TRIANGLES {
+        return Err(AccelError::TooManyTriangles {
+            count: triangles.len(),
+            limit: TriangleBvh::MAX_TRIANGLES,
+        });
+    }
+    for (vertex, &position) in positions.iter().enumerate() {
+        let position: Vec3 = position.into();
+        if !position.is_finite() {
+            return Err(AccelError::NonFiniteVertex { vertex });
+        }
+        let coordinate = position.abs().max_element();
+        if coordinate > TriangleBvh::MAX_COORDINATE {
+            let limit = TriangleBvh::MAX_COORDINATE;
+            return Err(AccelError::VertexTooFar {
+                vertex,
+                coordinate,
+                limit,
+            });
+        }
+    }
+    for (triangle, corners) in triangles.iter().enumerate() {
+        for &vertex in corners {
+            if vertex as usize >= positions.len() {
+                let vertices = positions.len();
+                return Err(AccelError::VertexOutOfRange {
+                    triangle,
+                    vertex,
+                    vertices,
+                });
+            }
+        }
+    }
+    Ok(())
+}
