@@ -1,8 +1,8 @@
 //! What a ray finds where it hits.
 
 use crate::world::World;
-use caustics_geometry::{BarycentricGradient, Hit, Ray, SpawnPoint, Sphere, Triangle, interpolate};
-use glam::{Mat3, Vec3};
+use caustics_geometry::{Hit, NormalGradient, Ray, SpawnPoint, Sphere, Triangle, interpolate};
+use glam::Vec3;
 
 /// A point on a surface of a [`World`], and what a tracer wants to know there.
 #[derive(Clone, Copy, Debug)]
@@ -67,37 +67,29 @@ impl World {
         })
     }
 
-    /// How the unit shading normal changes along the surface: the matrix that maps a displacement of
-    /// the point, in metres, to the change of its shading normal. Only the part of a displacement in
-    /// the surface's plane counts. Zero where the shading normal is the geometric one of a triangle.
-    ///
-    /// For a triangle, `n = sum of barycentric weight * vertex normal`, and the unit normal changes
-    /// by `((n.n) dn - (n.dn) n) / (n.n)^(3/2)` (Igehy, "Tracing ray differentials", 1999).
+    /// The shading normal and how it turns along the surface, as ray differentials need it. It does
+    /// not turn where the shading normal is a triangle's geometric one.
     #[must_use]
-    pub fn normal_jacobian(&self, point: &SurfacePoint) -> Mat3 {
+    pub fn normal_gradient(&self, point: &SurfacePoint) -> NormalGradient {
         if let Some(sphere) = self.sphere(point.primitive) {
-            let normal = point.geometric_normal;
-            return (Mat3::IDENTITY - outer(normal, normal)) * sphere.radius.recip();
+            return NormalGradient::on_sphere(sphere, point.spawn.position);
         }
-        self.triangle_normal_jacobian(point)
-            .filter(Mat3::is_finite)
-            .unwrap_or(Mat3::ZERO)
+        self.triangle_normal_gradient(point)
+            .filter(|gradient| gradient.derivative.is_finite())
+            .map_or(NormalGradient::flat(point.shading_normal), |gradient| {
+                if gradient.normal.dot(point.geometric_normal) < 0.0 {
+                    gradient.reversed()
+                } else {
+                    gradient
+                }
+            })
     }
 
-    fn triangle_normal_jacobian(&self, point: &SurfacePoint) -> Option<Mat3> {
-        let gradient = BarycentricGradient::new(&self.triangle(point.primitive)?)?;
-        let [a, b, c] = self.triangle_normals(point.primitive)?;
-        let raw = self.interpolated_normal(point.primitive, point.u, point.v)?;
-        let raw_jacobian = outer(b - a, gradient.u_gradient) + outer(c - a, gradient.v_gradient);
-        let square = raw.length_squared();
-        let unit_from_raw =
-            (Mat3::IDENTITY * square - outer(raw, raw)) * (square * square.sqrt()).recip();
-        let jacobian = unit_from_raw * raw_jacobian;
-        Some(if raw.dot(point.geometric_normal) < 0.0 {
-            -jacobian
-        } else {
-            jacobian
-        })
+    fn triangle_normal_gradient(&self, point: &SurfacePoint) -> Option<NormalGradient> {
+        let normals = self.triangle_normals(point.primitive)?;
+        self.interpolated_normal(point.primitive, point.u, point.v)?;
+        let triangle = self.triangle(point.primitive)?;
+        NormalGradient::on_triangle(&triangle, normals, point.u, point.v)
     }
 
     /// The triangle with this primitive number; `None` where the primitive is not a triangle.
@@ -137,9 +129,4 @@ fn towards(normal: Vec3, side: Vec3) -> Vec3 {
     } else {
         normal
     }
-}
-
-/// The matrix that maps `v` to `a (b . v)`.
-fn outer(a: Vec3, b: Vec3) -> Mat3 {
-    Mat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
