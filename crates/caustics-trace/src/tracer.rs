@@ -245,8 +245,8 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         let direction = branch.ray.direction;
         let normal_change = if outgoing.interpolated {
             let side = if point.from_outside { 1.0 } else { -1.0 };
-            let jacobian = self.world.normal_jacobian(point);
-            before.position.map(|moved| side * (jacobian * moved))
+            let gradient = self.world.normal_gradient(point);
+            before.position.map(|moved| side * gradient.along(moved))
         } else {
             [Vec3::ZERO; N]
         };
