@@ -1,0 +1,262 @@
+use std::f32::consts::PI;
+
+use caustics_trace::Photon;
+use glam::Vec3;
+
+/// Squared radius, in standard deviations, at which the Gaussian is cut off.
+const GAUSSIAN_CUT: f32 = 9.0;
+
+/// The least cosine between a photon's direction and its receiver at which other points of the
+/// receiver are still followed along that direction; below it they are followed along the normal.
+const MIN_INCIDENCE: f32 = 0.05;
+
+/// The shape in which a footprint spreads its flux.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FootprintKernel {
+    /// A Gaussian with the footprint's axes for its standard deviations, cut off at three of them.
+    #[default]
+    Gaussian,
+    /// Epanechnikov's parabola over the footprint's ellipse, as in adaptive anisotropic photon
+    /// scattering (Yang and Ouyang 2021).
+    Ellipse,
+    /// Constant over a disc of the footprint's area (Larsen 2006).
+    Disc,
+    /// The product of two tents along the footprint's axes: on a lattice they sum to one.
+    Tent,
+}
+
+impl FootprintKernel {
+    /// All kernels.
+    pub const ALL: [Self; 4] = [Self::Gaussian, Self::Ellipse, Self::Disc, Self::Tent];
+
+    /// The name in lower case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gaussian => "gaussian",
+            Self::Ellipse => "ellipse",
+            Self::Disc => "disc",
+            Self::Tent => "tent",
+        }
+    }
+
+    /// The extent of the kernel along each of its axes, for axes of one standard deviation.
+    pub(crate) fn reach(self) -> f32 {
+        match self {
+            Self::Gaussian => GAUSSIAN_CUT.sqrt(),
+            // Radii at which each kernel has the variance 1 along each axis.
+            Self::Ellipse | Self::Tent => 6.0f32.sqrt(),
+            Self::Disc => 2.0,
+        }
+    }
+
+    /// The kernel at coordinates along its axes in standard deviations; its integral is 1.
+    #[inline]
+    pub(crate) fn density(self, u: f32, v: f32) -> f32 {
+        let squared = u * u + v * v;
+        match self {
+            Self::Gaussian if squared < GAUSSIAN_CUT => {
+                // 1 / (2 pi (1 - exp(-9 / 2)))
+                0.160_942_8 * (-0.5 * squared).exp()
+            }
+            Self::Ellipse if squared < 6.0 => (1.0 - squared / 6.0) / (3.0 * PI),
+            Self::Disc if squared < 4.0 => 0.25 / PI,
+            Self::Tent => {
+                let width = 6.0f32.sqrt();
+                let tent = |x: f32| (1.0 - x.abs() / width).max(0.0);
+                tent(u) * tent(v) / 6.0
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// How photons are spread over their footprints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FootprintOptions {
+    /// The shape.
+    pub kernel: FootprintKernel,
+    /// Standard deviation of the kernel along a footprint's axis, in sample spacings; above 0.
+    pub scale: f32,
+    /// The longer axis may be at most this many times the shorter one, which is widened; at
+    /// least 1. Infinite keeps every footprint as its differential says.
+    pub max_anisotropy: f32,
+}
+
+impl Default for FootprintOptions {
+    fn default() -> Self {
+        Self { kernel: FootprintKernel::Gaussian, scale: 0.55, max_anisotropy: f32::INFINITY }
+    }
+}
+
+/// A photon's footprint as a density over its receiver's tangent plane.
+///
+/// The covariance is that of the footprint's axes, enlarged by the pixel's own where there is one.
+/// A point off the plane is followed to it along the photon's direction, so that on a curved
+/// receiver, or past an edge, the light falls where it would.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Density {
+    pub(crate) center: Vec3,
+    /// Unit normal on the lit side.
+    pub(crate) normal: Vec3,
+    /// Direction of the light.
+    pub(crate) incoming: Vec3,
+    /// Dot products with these are coordinates in standard deviations.
+    u_gradient: Vec3,
+    v_gradient: Vec3,
+    /// Two axes of one standard deviation in the plane.
+    axes: [Vec3; 2],
+    /// Flux over area and incident cosine: times the kernel and a receiver's own incident cosine,
+    /// its irradiance.
+    strength: Vec3,
+    kernel: FootprintKernel,
+}
+
+impl Density {
+    /// The density of a photon, blurred by a pixel whose edges on the receiver are `pixel`; `None`
+    /// for a footprint without area, which only a photon without a pixel can have.
+    pub(crate) fn new(
+        photon: &Photon,
+        pixel: Option<[Vec3; 2]>,
+        options: &FootprintOptions,
+    ) -> Option<Self> {
+        let normal = photon.normal;
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let mut covariance = Covariance::default();
+        let squared = options.scale * options.scale;
+        for axis in &photon.axes {
+            covariance.add(squared, axis.dot(tangent), axis.dot(bitangent));
+        }
+        covariance.limit_anisotropy(options.max_anisotropy);
+        if options.kernel == FootprintKernel::Disc {
+            covariance = covariance.rounded();
+        }
+        for axis in pixel.iter().flatten() {
+            // The variance of a box as wide as the pixel.
+            covariance.add(1.0 / 12.0, axis.dot(tangent), axis.dot(bitangent));
+        }
+        let [[xx, _], [xy, yy]] = covariance.cholesky()?;
+        let area = xx * yy;
+        let mut u_gradient = tangent / xx;
+        let mut v_gradient = (bitangent - (xy / xx) * tangent) / yy;
+        let incidence = photon.incoming.dot(normal);
+        if incidence < -MIN_INCIDENCE {
+            let slide = |gradient: Vec3| {
+                gradient - normal * (photon.incoming.dot(gradient) / incidence)
+            };
+            (u_gradient, v_gradient) = (slide(u_gradient), slide(v_gradient));
+        }
+        let cosine = (-incidence).max(MIN_INCIDENCE);
+        let density = Self {
+            center: photon.position,
+            normal,
+            incoming: photon.incoming,
+            u_gradient,
+            v_gradient,
+            axes: [xx * tangent + xy * bitangent, yy * bitangent],
+            strength: photon.flux / (area * cosine),
+            kernel: options.kernel,
+        };
+        (area > 0.0 && density.strength.is_finite()).then_some(density)
+    }
+
+    /// Coordinates of a point, in standard deviations.
+    #[inline]
+    pub(crate) fn coordinates(&self, point: Vec3) -> (f32, f32) {
+        let relative = point - self.center;
+        (relative.dot(self.u_gradient), relative.dot(self.v_gradient))
+    }
+
+    /// Irradiance at a point of a receiver with unit `normal`, by the part of the light that falls
+    /// on the side of the normal.
+    #[inline]
+    pub(crate) fn irradiance(&self, point: Vec3, normal: Vec3) -> Vec3 {
+        let (u, v) = self.coordinates(point);
+        let cosine = (-normal.dot(self.incoming)).max(0.0);
+        self.strength * (self.kernel.density(u, v) * cosine)
+    }
+
+    /// The kernel at the plane's point `axes` away from the center, times the area of one standard
+    /// deviation squared: what sums to 1 over cells of unit area in these coordinates.
+    pub(crate) fn weight(&self, offset: Vec3) -> f32 {
+        self.kernel.density(offset.dot(self.u_gradient), offset.dot(self.v_gradient))
+    }
+
+    /// Area of one standard deviation squared, in square metres.
+    pub(crate) fn unit_area(&self) -> f32 {
+        self.axes[0].cross(self.axes[1]).length()
+    }
+
+    /// Makes it `factor` times as bright.
+    pub(crate) fn scale_by(&mut self, factor: f32) {
+        self.strength *= factor;
+    }
+
+    /// Displacements from the center to the middles of the sides of a parallelogram that holds all
+    /// of the footprint.
+    pub(crate) fn half_extents(&self) -> [Vec3; 2] {
+        self.axes.map(|axis| self.kernel.reach() * axis)
+    }
+
+    /// No point farther from the center than this, in metres, belongs to the footprint.
+    pub(crate) fn radius(&self) -> f32 {
+        let [a, b] = self.half_extents();
+        (a.length_squared() + b.length_squared()).sqrt()
+    }
+}
+
+/// A symmetric matrix of two dimensions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Covariance {
+    xx: f32,
+    xy: f32,
+    yy: f32,
+}
+
+impl Covariance {
+    fn add(&mut self, weight: f32, x: f32, y: f32) {
+        self.xx += weight * x * x;
+        self.xy += weight * x * y;
+        self.yy += weight * y * y;
+    }
+
+    fn eigenvalues(&self) -> (f32, f32) {
+        let mean = 0.5 * (self.xx + self.yy);
+        let half = 0.5 * (self.xx - self.yy);
+        let spread = (half * half + self.xy * self.xy).sqrt();
+        ((mean - spread).max(0.0), mean + spread)
+    }
+
+    /// Widens the short axis, all around, until the long one is at most `limit` times as long.
+    fn limit_anisotropy(&mut self, limit: f32) {
+        if !limit.is_finite() {
+            return;
+        }
+        let (short, long) = self.eigenvalues();
+        let least = long / (limit * limit);
+        if short < least && limit > 1.0 {
+            // Adding w to both eigenvalues: (long + w) / (short + w) = limit².
+            let widened = (long - limit * limit * short) / (limit * limit - 1.0);
+            self.xx += widened;
+            self.yy += widened;
+        } else if limit <= 1.0 {
+            *self = Self { xx: long, xy: 0.0, yy: long };
+        }
+    }
+
+    /// A disc of the same area.
+    fn rounded(&self) -> Self {
+        let (short, long) = self.eigenvalues();
+        let variance = (short * long).sqrt();
+        Self { xx: variance, xy: 0.0, yy: variance }
+    }
+
+    /// The lower triangular matrix whose product with its transpose this is: `[[xx, 0], [xy, yy]]`.
+    fn cholesky(&self) -> Option<[[f32; 2]; 2]> {
+        let xx = self.xx.sqrt();
+        let xy = self.xy / xx;
+        let yy = (self.yy - xy * xy).max(1e-6 * self.yy).sqrt();
+        (xx > 0.0 && yy > 0.0 && xx.is_finite() && yy.is_finite()).then_some([[xx, 0.0], [xy, yy]])
+    }
+}
