@@ -118,7 +118,10 @@ impl SpawnPoint {
 ///
 /// Edge functions are off by the square of the longest edge, times machine epsilon; divided by
 /// the area, and times the depth of the triangle, that is this distance, for any direction of the
-/// ray. Half of it is enough for every one of some ten million random triangles and rays.
+/// ray. Half of it is enough for each of the 2 10^7 random triangles and rays of the ignored test
+/// `twenty_million_rays_never_meet_the_triangle_that_they_leave`. Without it the plain test finds
+/// one triangle in 10^5 again, and one in 300 of those whose longest edge is more than 10 times
+/// their height.
 #[inline]
 fn plane_error(ab: Vec3, ac: Vec3) -> f32 {
     let longest_squared = ab
