@@ -11,7 +11,7 @@ use exr::prelude::{
     read,
 };
 
-use crate::{DecodeError, EncodeError, FileError, Image};
+use crate::{DecodeError, EncodeError, FileError, Image, ImageError};
 
 /// Encodes an image as `OpenEXR`: 32-bit float channels R, G and B, scan lines, ZIP compression.
 ///
@@ -79,10 +79,26 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Image, DecodeError> {
             channels: names.join(", "),
         });
     };
-    let size = header.layer_size;
+    // The decoder would put the samples of such a channel in the wrong places.
+    if let Some(channel) = header
+        .channels
+        .list
+        .iter()
+        .find(|c| c.sampling != Vec2(1, 1))
+    {
+        let reason = format!(
+            "channel {} is subsampled, which is not supported",
+            channel.name
+        );
+        return Err(DecodeError::Malformed { reason });
+    }
     let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
-    // Refuses a size before the decoder asks for the memory.
-    let blank = Image::new(side(size.width()), side(size.height()))?;
+    let (width, height) = (
+        side(header.layer_size.width()),
+        side(header.layer_size.height()),
+    );
+    // Before the decoder asks for the memory.
+    Image::check_size(width, height)?;
 
     let decoded = read()
         .no_deep_data()
@@ -92,10 +108,12 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Image, DecodeError> {
         .required(green)
         .required(blue)
         .collect_pixels(
-            move |_, _| blank.clone(),
-            |image: &mut Image, position, (red, green, blue): (f32, f32, f32)| {
+            move |_, _| Image::new(width, height),
+            |image: &mut Result<Image, ImageError>,
+             position,
+             (red, green, blue): (f32, f32, f32)| {
                 let (x, y) = (position.x() as u32, position.y() as u32);
-                if let Some(pixel) = image.pixel_mut(x, y) {
+                if let Some(pixel) = image.as_mut().ok().and_then(|image| image.pixel_mut(x, y)) {
                     *pixel = [red, green, blue];
                 }
             },
@@ -105,7 +123,7 @@ pub fn decode_exr(bytes: &[u8]) -> Result<Image, DecodeError> {
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(malformed)?;
-    Ok(decoded.layer_data.channel_data.pixels)
+    Ok(decoded.layer_data.channel_data.pixels?)
 }
 
 /// Reads an `OpenEXR` file, as [`decode_exr`] does.

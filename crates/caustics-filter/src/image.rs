@@ -55,7 +55,7 @@ impl Image {
     ///
     /// A width or height of zero, or too many pixels.
     pub fn new(width: u32, height: u32) -> Result<Self, ImageError> {
-        let count = pixel_count(width, height)?;
+        let count = Self::check_size(width, height)?;
         Ok(Self {
             width,
             height,
@@ -69,7 +69,7 @@ impl Image {
     ///
     /// A width or height of zero, too many pixels, or a wrong number of them.
     pub fn from_pixels(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Result<Self, ImageError> {
-        if pixels.len() != pixel_count(width, height)? {
+        if pixels.len() != Self::check_size(width, height)? {
             return Err(ImageError::PixelCount {
                 width,
                 height,
@@ -154,17 +154,17 @@ impl Image {
         values.iter().copied().map(f64::from).sum::<f64>() / values.len() as f64
     }
 
+    /// The number of pixels of an image of this size, if there can be one.
+    pub(crate) fn check_size(width: u32, height: u32) -> Result<usize, ImageError> {
+        let count = u64::from(width) * u64::from(height);
+        match usize::try_from(count) {
+            Ok(count) if (1..=Self::MAX_PIXELS).contains(&count) => Ok(count),
+            _ => Err(ImageError::Size { width, height }),
+        }
+    }
+
     fn index(&self, x: u32, y: u32) -> Option<usize> {
         (x < self.width && y < self.height).then_some(y as usize * self.width as usize + x as usize)
-    }
-}
-
-/// The number of pixels of an image of this size, if it can be one.
-fn pixel_count(width: u32, height: u32) -> Result<usize, ImageError> {
-    let count = u64::from(width) * u64::from(height);
-    match usize::try_from(count) {
-        Ok(count) if (1..=Image::MAX_PIXELS).contains(&count) => Ok(count),
-        _ => Err(ImageError::Size { width, height }),
     }
 }
 

@@ -102,8 +102,9 @@ impl Comparison {
 ///
 /// As [`Comparison::new`].
 pub fn energy_ratio(test: &Image, reference: &Image) -> Result<f64, MetricError> {
-    let total = reference_mean(test, reference)? * values(reference).len() as f64;
-    Ok(values(test).map(finite_or_zero).sum::<f64>() / total)
+    reference_mean(test, reference)?;
+    let total = |image| values(image).map(finite_or_zero).sum::<f64>();
+    Ok(total(test) / total(reference))
 }
 
 /// Root of the mean squared difference, in the images' unit. The reference may be black.

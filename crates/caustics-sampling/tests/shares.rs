@@ -47,18 +47,25 @@ proptest! {
     }
 
     #[test]
-    fn entries_above_the_floor_stay_in_proportion(
+    fn shares_with_a_floor_differ_from_the_exact_ones_by_less_than_one(
         weights in weights(), total in 1000_usize..10_000, floor in 0_usize..20,
     ) {
-        // The floor takes from the others in proportion: their quotients differ by rounding only.
+        // Oracle: the rate at which max(floor, rate weight) sums to the total, by bisection.
+        let entries = weights.iter().filter(|&&w| w > 0.0).count();
+        let total = total + floor * entries;
         let shares = apportion_with_floor(&weights, total, floor).unwrap();
-        let above: Vec<_> =
-            (0..weights.len()).filter(|&i| weights[i] > 0.0 && shares[i] > floor).collect();
-        let sum: f64 = above.iter().map(|&i| weights[i]).sum();
-        let shared: usize = above.iter().map(|&i| shares[i]).sum();
-        for &i in &above {
-            let exact = weights[i] / sum * shared as f64;
-            prop_assert!((shares[i] as f64 - exact).abs() <= 2.0, "{} for {exact}", shares[i]);
+        let exact = |rate: f64, weight: f64| {
+            if weight > 0.0 { (rate * weight).max(floor as f64) } else { 0.0 }
+        };
+        let (mut low, mut high) = (0.0_f64, 1e30_f64);
+        for _ in 0..300 {
+            let middle = 0.5 * (low + high);
+            let sum: f64 = weights.iter().map(|&w| exact(middle, w)).sum();
+            if sum < total as f64 { low = middle } else { high = middle }
+        }
+        for (&weight, &share) in weights.iter().zip(&shares) {
+            let exact = exact(low, weight);
+            prop_assert!((share as f64 - exact).abs() < 1.0 + 1e-6, "{share} for {exact}");
         }
     }
 
