@@ -3,9 +3,8 @@
 use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray, WatertightRay};
 
-use super::avx2::Stack;
-use super::lanes::Lanes;
-use super::layout::{Block, Child, Node, Row};
+use super::layout::{Block, Child, Node};
+use crate::simd::{Kernel, Lanes, Row, Stack};
 
 /// What traversal reads.
 #[derive(Clone, Copy)]
@@ -13,6 +12,36 @@ pub(super) struct Tree<'a> {
     pub(super) nodes: &'a [Node],
     pub(super) blocks: &'a [Block],
     pub(super) root: Child,
+}
+
+/// The closest hit of a ray.
+pub(super) struct ClosestHit<'a> {
+    pub(super) tree: Tree<'a>,
+    pub(super) ray: &'a Ray,
+}
+
+impl Kernel for ClosestHit<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
+        closest_hit(lanes, self.tree, self.ray)
+    }
+}
+
+/// Whether a ray hits anything.
+pub(super) struct Occlusion<'a> {
+    pub(super) tree: Tree<'a>,
+    pub(super) ray: &'a Ray,
+}
+
+impl Kernel for Occlusion<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> bool {
+        is_occluded(lanes, self.tree, self.ray)
+    }
 }
 
 /// Entries that wait at most; see [`MAX_DEPTH`].
@@ -250,7 +279,7 @@ fn lower_end(ray: &Ray) -> f32 {
 }
 
 #[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
+fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
     let prepared = Prepared::new(lanes, ray, lower_end(ray))?;
     // Hits at exactly this parameter count, so that of two at the same place the one with the
     // lower index wins, whichever is found first.
@@ -258,7 +287,7 @@ pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Opti
     let mut limits = lanes.splat(limit);
     let mut widened = limit * WIDEN;
     let mut hit = None::<Hit>;
-    let mut stack = Stack::<STACK>::new();
+    let mut stack = Stack::<u64, STACK>::new();
     let mut current = tree.root;
     loop {
         while !current.is_leaf() {
@@ -345,14 +374,14 @@ pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Opti
 }
 
 #[inline(always)]
-pub(super) fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
+fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
     let Some(prepared) = Prepared::new(lanes, ray, lower_end(ray)) else {
         return false;
     };
     let limit = ray.t_max.next_down();
     let limits = lanes.splat(limit);
     let widened = lanes.splat(limit * WIDEN);
-    let mut stack = Stack::<STACK>::new();
+    let mut stack = Stack::<u64, STACK>::new();
     stack.push(u64::from(tree.root.0));
     while let Some(next) = stack.pop() {
         let current = child_of(next);
