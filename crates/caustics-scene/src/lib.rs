@@ -2,6 +2,8 @@
 
 mod area_light;
 mod camera;
+#[cfg(feature = "gltf")]
+pub mod gltf;
 mod light;
 mod material;
 mod point_on;
