@@ -1,7 +1,9 @@
 use std::f32::consts::PI;
 
 use caustics_trace::Photon;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+
+use crate::error::RenderError;
 
 /// Squared radius, in standard deviations, at which the Gaussian is cut off.
 const GAUSSIAN_CUT: f32 = 9.0;
@@ -39,6 +41,24 @@ impl FootprintKernel {
             Self::Disc => "disc",
             Self::Tent => "tent",
         }
+    }
+
+    /// Squared radius, in standard deviations, beyond which the kernel is zero.
+    pub(crate) fn cut(self) -> f32 {
+        match self {
+            Self::Gaussian => GAUSSIAN_CUT,
+            Self::Ellipse => 6.0,
+            Self::Disc => 4.0,
+            Self::Tent => 12.0,
+        }
+    }
+
+    /// The variance that a pixel adds along each of its edges, in squared pixels.
+    ///
+    /// For the Gaussian it is that of the box as wide as the pixel. The others end sooner, and need
+    /// more to reach a pixel's middle from wherever they stand.
+    fn pixel_variance(self) -> f32 {
+        if self == Self::Gaussian { 1.0 / 12.0 } else { 0.25 }
     }
 
     /// The extent of the kernel along each of its axes, for axes of one standard deviation.
@@ -90,6 +110,22 @@ impl Default for FootprintOptions {
     }
 }
 
+impl FootprintOptions {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// A scale or an anisotropy out of range.
+    pub fn validate(&self) -> Result<(), RenderError> {
+        if !(self.scale > 0.0 && self.scale.is_finite()) {
+            return Err(RenderError::InvalidScale { scale: self.scale });
+        }
+        if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
+            return Err(RenderError::InvalidAnisotropy { max_anisotropy: self.max_anisotropy });
+        }
+        Ok(())
+    }
+}
+
 /// A photon's footprint as a density over its receiver's tangent plane.
 ///
 /// The covariance is that of the footprint's axes, enlarged by the pixel's own where there is one.
@@ -133,8 +169,7 @@ impl Density {
             covariance = covariance.rounded();
         }
         for axis in pixel.iter().flatten() {
-            // The variance of a box as wide as the pixel.
-            covariance.add(1.0 / 12.0, axis.dot(tangent), axis.dot(bitangent));
+            covariance.add(options.kernel.pixel_variance(), axis.dot(tangent), axis.dot(bitangent));
         }
         let [[xx, _], [xy, yy]] = covariance.cholesky()?;
         let area = xx * yy;
@@ -177,15 +212,19 @@ impl Density {
         self.strength * (self.kernel.density(u, v) * cosine)
     }
 
-    /// The kernel at the plane's point `axes` away from the center, times the area of one standard
-    /// deviation squared: what sums to 1 over cells of unit area in these coordinates.
-    pub(crate) fn weight(&self, offset: Vec3) -> f32 {
-        self.kernel.density(offset.dot(self.u_gradient), offset.dot(self.v_gradient))
+    /// What a displacement in the plane adds to the coordinates.
+    pub(crate) fn along(&self, displacement: Vec3) -> [f32; 2] {
+        [displacement.dot(self.u_gradient), displacement.dot(self.v_gradient)]
     }
 
-    /// Area of one standard deviation squared, in square metres.
-    pub(crate) fn unit_area(&self) -> f32 {
-        self.axes[0].cross(self.axes[1]).length()
+    /// The kernel at coordinates in standard deviations.
+    pub(crate) fn kernel_at(&self, coordinates: Vec2) -> f32 {
+        self.kernel.density(coordinates.x, coordinates.y)
+    }
+
+    /// Squared radius, in standard deviations, beyond which there is no light.
+    pub(crate) fn cut(&self) -> f32 {
+        self.kernel.cut()
     }
 
     /// Makes it `factor` times as bright.
