@@ -10,7 +10,6 @@ mod light;
 mod material;
 mod point_on;
 mod scene;
-mod scene_intersector;
 mod surface_point;
 mod world;
 
@@ -21,6 +20,5 @@ pub use intersector::SceneIntersector;
 pub use light::{Light, LightError};
 pub use material::{MAX_ATTENUATION, Material, MaterialError, Surface};
 pub use scene::{Instance, MaterialId, MeshId, Scene, SceneError, Shape};
-pub use scene_intersector::SceneIntersector;
 pub use surface_point::SurfacePoint;
 pub use world::{Object, World};
