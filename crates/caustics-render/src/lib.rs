@@ -1,5 +1,6 @@
 //! To be written.
 
+mod columns;
 mod direct;
 mod error;
 mod estimate;

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 
+use crate::columns::{Columns, ColumnsMut, Gate, TexelColumns};
 use crate::footprint::{Density, FootprintOptions};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::error::RenderError;
@@ -16,10 +17,10 @@ const BAND: usize = 16;
 const BATCH: usize = 1 << 17;
 
 /// Pixels a side of a level's pixel on the level below.
-const STRIDE: u32 = 4;
+const STRIDE: u32 = 2;
 
 /// Levels of resolution.
-const LEVELS: usize = 3;
+const LEVELS: usize = 7;
 
 /// The least standard deviation of a footprint, in pixels of a level, that may be splatted there:
 /// linear interpolation between the level's pixels then errs by 3 % of the footprint's peak.
@@ -96,8 +97,7 @@ pub fn splat(
 #[derive(Clone, Copy, Debug)]
 struct Splat {
     density: Density,
-    /// Texels farther off its plane are not lit, in metres.
-    plane_distance: f32,
+    gate: Gate,
     level: u8,
     /// Whether a pixel's coordinates tell where it lies in the footprint; if not, every pixel of
     /// the rows and columns is asked.
@@ -155,7 +155,11 @@ impl Splat {
             density.scale_by(normalisation(&density, center, step_x, step_y));
         }
         let mut splat = Self {
-            plane_distance: PLANE_DISTANCE * density.radius(),
+            gate: Gate {
+                reach: density.radius(),
+                plane_distance: PLANE_DISTANCE * density.radius(),
+                normal_cosine: MIN_NORMAL_COSINE,
+            },
             density,
             level: 0,
             is_local,
@@ -221,10 +225,11 @@ impl Splat {
     /// What the photon adds to the irradiance of a texel.
     #[inline]
     fn irradiance(&self, texel: &Texel) -> Vec3 {
-        let relative = texel.position - self.density.center;
-        let is_lit = relative.dot(self.density.normal).abs() <= self.plane_distance
-            && texel.normal.dot(self.density.normal) >= MIN_NORMAL_COSINE;
-        if is_lit { self.density.irradiance(texel.position, texel.normal) } else { Vec3::ZERO }
+        if self.gate.admits(&self.density, texel.position, texel.normal) {
+            self.density.irradiance(texel.position, texel.normal)
+        } else {
+            Vec3::ZERO
+        }
     }
 }
 
@@ -305,7 +310,8 @@ struct Level {
     width: usize,
     height: usize,
     texels: Vec<Option<Texel>>,
-    irradiance: Vec<Vec3>,
+    columns: TexelColumns,
+    irradiance: Columns,
     extras: Vec<(u32, Texel)>,
     extra_irradiance: Vec<Vec3>,
     /// For each band, where its extras start; one more than there are bands.
@@ -321,7 +327,8 @@ impl Level {
         Self {
             width,
             height,
-            irradiance: vec![Vec3::ZERO; texels.len()],
+            irradiance: Columns::zero(texels.len()),
+            columns: TexelColumns::new(&texels),
             texels,
             extra_irradiance: vec![Vec3::ZERO; extras.len()],
             extras,
@@ -386,7 +393,7 @@ impl Level {
             tasks.push(BandTask {
                 first_row: number * BAND,
                 width: self.width,
-                texels: &self.texels[number * BAND * self.width..],
+                columns: &self.columns,
                 irradiance,
                 extras: &self.extras[extras],
                 extra_irradiance,
@@ -410,17 +417,22 @@ impl Level {
             let (x, y) = (pixel % width, pixel / width);
             (Vec2::new(x as f32, y as f32) + 0.5) / stride - 0.5
         };
-        if coarse.irradiance.iter().all(|it| *it == Vec3::ZERO) {
+        if coarse.is_dark() {
             return;
         }
         for (pixel, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                self.irradiance[pixel] += coarse.interpolate(place(pixel), texel);
+                let sum = self.irradiance.get(pixel) + coarse.interpolate(place(pixel), texel);
+                self.irradiance.set(pixel, sum);
             }
         }
         for ((pixel, texel), irradiance) in self.extras.iter().zip(&mut self.extra_irradiance) {
             *irradiance += coarse.interpolate(place(*pixel as usize), texel);
         }
+    }
+
+    fn is_dark(&self) -> bool {
+        self.irradiance.x.iter().chain(&self.irradiance.y).chain(&self.irradiance.z).all(|&it| it == 0.0)
     }
 
     /// The irradiance between the middles of pixels, from those that see the same surface.
@@ -443,7 +455,7 @@ impl Level {
                     }
                     let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
                     let weight = tent.x * tent.y;
-                    sum += weight * self.irradiance[index];
+                    sum += weight * self.irradiance.get(index);
                     weights += weight;
                 }
             }
@@ -459,7 +471,7 @@ impl Level {
         let pixels = image.pixels_mut();
         for (index, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance[index]).to_array();
+                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance.get(index)).to_array();
             }
         }
         for ((pixel, texel), irradiance) in self.extras.iter().zip(&self.extra_irradiance) {
@@ -474,17 +486,17 @@ impl Level {
 struct BandTask<'a> {
     first_row: usize,
     width: usize,
+    columns: &'a TexelColumns,
     /// From the band's first row on.
-    texels: &'a [Option<Texel>],
-    irradiance: &'a mut [Vec3],
+    irradiance: ColumnsMut<'a>,
     extras: &'a [(u32, Texel)],
     extra_irradiance: &'a mut [Vec3],
     splats: &'a [u32],
 }
 
 impl BandTask<'_> {
-    fn run(self, prepared: &[Prepared]) -> DVec3 {
-        let rows = self.irradiance.len() / self.width;
+    fn run(mut self, prepared: &[Prepared]) -> DVec3 {
+        let rows = self.irradiance.x.len() / self.width;
         let deposited = DVec3::ZERO;
         for &index in self.splats {
             let Prepared::Splat(splat) = &prepared[index as usize] else { continue };
@@ -493,13 +505,14 @@ impl BandTask<'_> {
             for row in first..last {
                 let span = splat.span(row);
                 let start = (row - self.first_row) * self.width;
-                let span = start + span.start..start + span.end;
-                let texels = &self.texels[span.clone()];
-                for (irradiance, texel) in self.irradiance[span].iter_mut().zip(texels) {
-                    if let Some(texel) = texel {
-                        *irradiance += splat.irradiance(texel);
-                    }
-                }
+                self.columns.light(
+                    &splat.density,
+                    &splat.gate,
+                    row * self.width + span.start,
+                    span.len(),
+                    &mut self.irradiance,
+                    start + span.start,
+                );
             }
             if !self.extras.is_empty() && first < last {
                 let low = (first * self.width) as u32;
