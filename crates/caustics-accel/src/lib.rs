@@ -1,5 +1,6 @@
 //! Triangle and photon acceleration structures.
 
+mod box_tree;
 mod error;
 mod intersect;
 mod left_balanced_tree;
@@ -8,6 +9,7 @@ mod photon_tree;
 mod simd;
 mod triangle_bvh;
 
+pub use box_tree::BoxTree;
 pub use error::AccelError;
 pub use intersect::Intersect;
 pub use left_balanced_tree::LeftBalancedTree;

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 
-use crate::footprint::{Density, FootprintOptions};
+use crate::footprint::{Density, FootprintOptions, MIN_NORMAL_COSINE};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::error::RenderError;
 use crate::screen::Screen;
@@ -27,12 +27,6 @@ const LEVEL_SIGMA: f32 = 2.0;
 
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
-
-/// The least cosine between the normals of a footprint and of a texel that it may light.
-const MIN_NORMAL_COSINE: f32 = 0.5;
-
-/// How far off its plane a footprint lights a texel, relative to its radius.
-const PLANE_DISTANCE: f32 = 0.3;
 
 /// What became of the photons that were splatted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -155,7 +149,7 @@ impl Splat {
             density.scale_by(normalisation(&density, center, step_x, step_y));
         }
         let mut splat = Self {
-            plane_distance: PLANE_DISTANCE * density.radius(),
+            plane_distance: density.plane_distance(),
             density,
             level: 0,
             is_local,
