@@ -1,5 +1,6 @@
 //! Every feature of glTF that is modelled, each in a file written for it.
 #![cfg(feature = "gltf")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod writer;
 

@@ -48,7 +48,7 @@ impl Writer {
 
     /// A view of new bytes in the buffer.
     pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
-        while self.bin.len() % 4 != 0 {
+        while !self.bin.len().is_multiple_of(4) {
             self.bin.push(0);
         }
         let offset = self.bin.len();
