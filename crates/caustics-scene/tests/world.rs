@@ -32,7 +32,8 @@ fn transform() -> impl Strategy<Value = Affine3A> {
     )
 }
 
-/// Corners that are not nearly on a line, and normals within 60 degrees of the face's.
+/// Corners that are not nearly on a line, and normals within 60 degrees of the face's, or, as in
+/// files that are inside out, of its opposite.
 fn triangle() -> impl Strategy<Value = ([Vec3; 3], [Vec3; 3])> {
     let corners =
         prop::array::uniform3(vector(-2.0..2.0)).prop_filter("well shaped", |[a, b, c]| {
@@ -40,10 +41,12 @@ fn triangle() -> impl Strategy<Value = ([Vec3; 3], [Vec3; 3])> {
             let longest = p.length().max(q.length()).max((p - q).length());
             p.cross(q).length() > 0.1 * longest * longest && longest > 0.1
         });
-    (corners, prop::array::uniform3(unit())).prop_map(|([a, b, c], tilts)| {
-        let face = (b - a).cross(c - a).normalize();
-        ([a, b, c], tilts.map(|tilt| (face + 0.8 * tilt).normalize()))
-    })
+    (corners, prop::array::uniform3(unit()), any::<bool>()).prop_map(
+        |([a, b, c], tilts, inward)| {
+            let face = (b - a).cross(c - a).normalize() * if inward { -1.0 } else { 1.0 };
+            ([a, b, c], tilts.map(|tilt| (face + 0.8 * tilt).normalize()))
+        },
+    )
 }
 
 /// Barycentric weights inside a triangle.
@@ -141,10 +144,12 @@ proptest! {
         prop_assert!(gradient.normal.distance(point.shading_normal) < 1e-6);
 
         let unit_normals = world.triangle_normals(0).unwrap().map(Vec3::as_dvec3);
+        let face = point.geometric_normal.as_dvec3();
         let at = |step: f64| {
             let (u, v) = (f64::from(u) + step * du, f64::from(v) + step * dv);
             let [a, b, c] = unit_normals;
-            ((1.0 - u - v) * a + u * b + v * c).normalize()
+            let normal = ((1.0 - u - v) * a + u * b + v * c).normalize();
+            normal * normal.dot(face).signum()
         };
         let [a, b, c] = corners.map(Vec3::as_dvec3);
         let displacement = du * (b - a) + dv * (c - a);
