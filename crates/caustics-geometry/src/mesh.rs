@@ -3,6 +3,7 @@ use std::collections::HashMap;
 use glam::{Affine3A, Mat3, Vec3};
 use thiserror::Error;
 
+use crate::unit_vector::direction;
 use crate::vertex_normals::smooth_normals;
 use crate::{Aabb, Triangle};
 
@@ -253,6 +254,7 @@ impl TriangleMesh {
         // flattening maps as well.
         let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
         let scale = x.abs().max(y.abs()).max(z.abs()).max_element();
+        let scale = if scale > 0.0 { scale } else { 1.0 };
         let (x, y, z) = (x / scale, y / scale, z / scale);
         let cofactor = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
         let outward = if mirrors { -1.0 } else { 1.0 };
@@ -264,7 +266,7 @@ impl TriangleMesh {
         let normals = self
             .normals
             .iter()
-            .map(|normal| (outward * (cofactor * *normal)).normalize_or_zero())
+            .map(|normal| outward * (cofactor * *normal))
             .collect();
         let triangles = self
             .triangles
@@ -337,8 +339,7 @@ fn unit_normals(
         if !normal.is_finite() {
             return Err(MeshError::NonFiniteNormal { vertex });
         }
-        // Scaled first, since the square of a very short or long normal leaves f32.
-        match (*normal / normal.abs().max_element()).try_normalize() {
+        match direction(*normal) {
             Some(unit) => *normal = unit,
             None => missing.push(vertex),
         }

@@ -2,6 +2,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use crate::Ray;
+use crate::unit_vector::direction;
 
 /// An unbounded plane, hit from both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +42,7 @@ impl Plane {
         if !point.is_finite() {
             return Err(PlaneError::NonFinitePoint { point });
         }
-        // Scaled first, since the square of a very short or long normal leaves f32.
-        let unit = (normal / normal.abs().max_element()).try_normalize();
-        let normal = unit.ok_or(PlaneError::InvalidNormal { normal })?;
+        let normal = direction(normal).ok_or(PlaneError::InvalidNormal { normal })?;
         Ok(Self { point, normal })
     }
 

@@ -49,6 +49,6 @@ impl Ray {
     #[inline]
     #[must_use]
     pub fn contains(&self, t: f32) -> bool {
-        self.t_min < t && t < self.t_max
+        (self.t_min < t) & (t < self.t_max)
     }
 }

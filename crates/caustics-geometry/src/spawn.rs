@@ -41,12 +41,18 @@ impl SpawnPoint {
     ///
     /// Made from the vertices and not from the ray, because the error of `origin + t direction`
     /// grows with the length of the ray.
+    ///
+    /// To the error of the point is added that of the next intersection test, which sees the
+    /// plane of the triangle moved by rounding: by about machine epsilon times the longest edge
+    /// times the ratio of that edge to the triangle's height. It is below the first for all but
+    /// slivers, and never more than a thousandth of the longest edge.
     #[must_use]
     pub fn on_triangle(a: Vec3, b: Vec3, c: Vec3, u: f32, v: f32) -> Self {
+        let plane_error = plane_error(b - a, c - a);
         let (a, b, c) = ((1.0 - u - v) * a, u * b, v * c);
         Self {
             position: a + b + c,
-            error: gamma(7) * (a.abs() + b.abs() + c.abs()),
+            error: gamma(7) * (a.abs() + b.abs() + c.abs()) + plane_error,
         }
     }
 
@@ -105,6 +111,27 @@ impl SpawnPoint {
         let end = target.origin_towards(target_normal, -towards);
         Ray::with_range(origin, end - origin, 0.0, 1.0)
     }
+}
+
+/// How far rounding in an intersection test moves the plane of a triangle of these two edges, in
+/// metres.
+///
+/// Edge functions are off by the square of the longest edge, times machine epsilon; divided by
+/// the area, and times the depth of the triangle, that is this distance, for any direction of the
+/// ray. Half of it is enough for each of the 2 10^7 random triangles and rays of the ignored test
+/// `twenty_million_rays_never_meet_the_triangle_that_they_leave`. Without it the plain test finds
+/// one triangle in 10^5 again, and one in 300 of those whose longest edge is more than 10 times
+/// their height.
+#[inline]
+fn plane_error(ab: Vec3, ac: Vec3) -> f32 {
+    let longest_squared = ab
+        .length_squared()
+        .max(ac.length_squared())
+        .max((ac - ab).length_squared());
+    let longest = longest_squared.sqrt();
+    let relative = UNIT_ROUNDOFF * longest_squared / ab.cross(ac).length();
+    // Without area the ratio is infinite or NaN, which `min` both replaces.
+    longest * relative.min(1.0 / 1024.0)
 }
 
 /// The next f32 in the direction of the offset, which makes up for the rounding of the sum.

@@ -1,5 +1,6 @@
 use glam::Vec3;
 
+use crate::unit_vector::direction_and_length;
 use crate::{Aabb, Hit};
 
 /// Three points in space, wound counterclockwise as seen from the front.
@@ -81,10 +82,10 @@ impl Triangle {
     pub fn normal_and_area(&self) -> Option<(Vec3, f32)> {
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let (ab_size, ac_size) = (ab.abs().max_element(), ac.abs().max_element());
+        // NaN for an edge without length, and so without direction.
         let cross = (ab / ab_size).cross(ac / ac_size);
-        let length = cross.length();
-        // Also false for the NaN of an edge without length.
-        (length > 0.0).then(|| (cross / length, 0.5 * length * ab_size * ac_size))
+        let (normal, length) = direction_and_length(cross)?;
+        Some((normal, 0.5 * length * ab_size * ac_size))
     }
 }
 

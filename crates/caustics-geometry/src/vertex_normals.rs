@@ -1,6 +1,7 @@
 use glam::Vec3;
 
 use crate::Triangle;
+use crate::unit_vector::direction;
 
 /// The unit normal of each vertex: the mean of the normals of its triangles, weighted by the
 /// angle that each has at the vertex (Thürmer and Wüthrich 1998, "Computing Vertex Normals from
@@ -29,7 +30,7 @@ pub(crate) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
     }
     sums.iter()
         .zip(fallbacks)
-        .map(|(sum, fallback)| sum.try_normalize().unwrap_or(fallback))
+        .map(|(sum, fallback)| direction(*sum).unwrap_or(fallback))
         .collect()
 }
 

@@ -26,6 +26,12 @@ use crate::{Ray, TriangleHit};
 ///   edge-on is left to its neighbours. This happens to almost no ray and costs the others
 ///   nothing.
 ///
+/// Of 10^8 rays from inside an icosphere at random points of its edges, none got through; of the
+/// same rays, 11.7 million got through the test of
+/// [`PrecomputedTriangle`](crate::PrecomputedTriangle). The ignored test
+/// `a_hundred_million_rays_at_edges_do_not_get_through` counts both again; the first million run
+/// with every test.
+///
 /// It holds while vertices and origin stay below 10^18 in each coordinate
 /// ([`TriangleMesh`](crate::TriangleMesh) sees to that for vertices), and it says nothing about
 /// `t`: a mesh nearer than the rounding of `t` to `t_min` can be stepped over.
@@ -86,9 +92,10 @@ impl WatertightRay {
         let weight_a = cx * by - cy * bx;
         let weight_b = ax * cy - ay * cx;
         let weight_c = bx * ay - by * ax;
-        let any_negative = weight_a < 0.0 || weight_b < 0.0 || weight_c < 0.0;
-        let any_positive = weight_a > 0.0 || weight_b > 0.0 || weight_c > 0.0;
-        if any_negative && any_positive {
+        // Without short circuits: one branch that is often foreseen instead of six that are not.
+        let any_negative = (weight_a < 0.0) | (weight_b < 0.0) | (weight_c < 0.0);
+        let any_positive = (weight_a > 0.0) | (weight_b > 0.0) | (weight_c > 0.0);
+        if any_negative & any_positive {
             return None;
         }
         let sum = weight_a + weight_b + weight_c;
@@ -104,7 +111,7 @@ impl WatertightRay {
             (depth * self.shear.z, u, v)
         };
         // False for the NaN that a zero direction or an infinite vertex leads to.
-        (self.t_min < t && t < t_max).then_some(TriangleHit { t, u, v })
+        ((self.t_min < t) & (t < t_max)).then_some(TriangleHit { t, u, v })
     }
 }
 

@@ -44,7 +44,8 @@ fn one_each_way(mesh: &TriangleMesh) -> bool {
 /// Normals are of unit length, and on the same side as the winding.
 fn normals_agree(mesh: &TriangleMesh) -> bool {
     (0..mesh.triangles().len()).all(|i| {
-        let face = mesh.triangle(i).unwrap().unit_normal().unwrap();
+        let face = mesh.triangle(i).and_then(|triangle| triangle.unit_normal());
+        let face = face.expect("a mesh keeps only triangles with an area");
         mesh.triangles()[i].iter().all(|&vertex| {
             let normal = mesh.normals()[vertex as usize];
             (normal.length() - 1.0).abs() < 1e-6 && normal.dot(face) > 0.0
