@@ -1,1 +1,8 @@
-//! Shared code of this package.
+//! What the benchmarks of this workspace have in common: meshes, rays, photons and peers.
+
+#[cfg(feature = "embree")]
+pub mod embree;
+pub mod meshes;
+pub mod photons;
+pub mod random;
+pub mod rays;

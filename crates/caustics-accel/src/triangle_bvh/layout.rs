@@ -2,11 +2,7 @@
 
 use bytemuck::Zeroable;
 
-/// Children of a node and triangles of a block: one for each SIMD lane.
-pub(super) const WIDTH: usize = 8;
-
-/// One number for each lane.
-pub(super) type Row = [f32; WIDTH];
+use crate::simd::{Row, WIDTH};
 
 /// An inner node: the bounding boxes of up to eight children, one to a lane.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,5 @@
-mod avx2;
 mod binary_tree;
 mod collapse;
-mod lanes;
 mod layout;
 mod traverse;
 
@@ -10,10 +8,10 @@ use caustics_geometry::{Aabb, Hit, Ray};
 
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
-use self::lanes::Portable;
 use self::layout::{Block, Child, Node};
-use self::traverse::{MAX_DEPTH, Tree};
-use crate::{AccelError, Intersect};
+use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
+use crate::simd::Dispatch;
+use crate::{AccelError, Instructions, Intersect};
 
 /// How much time to spend on building for the sake of tracing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -28,17 +26,6 @@ pub enum BvhPreset {
     Balanced,
     /// For meshes that never change: several times longer to build, a few per cent to gain.
     FastTrace,
-}
-
-/// Which processor instructions to trace with. All of them return the same bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Instructions {
-    /// The widest that this processor has, found out when the tree is built.
-    #[default]
-    Detect,
-    /// Only what the program was compiled for.
-    Portable,
 }
 
 /// Settings of [`TriangleBvh::new`].
@@ -73,26 +60,7 @@ pub struct TriangleBvh {
     triangles: usize,
     /// Those that can be hit.
     stored: usize,
-    instructions: Chosen,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Chosen {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2(avx2::Avx2),
-}
-
-impl Chosen {
-    fn new(instructions: Instructions) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if instructions == Instructions::Detect
-            && let Some(avx2) = avx2::Avx2::detect()
-        {
-            return Self::Avx2(avx2);
-        }
-        Self::Portable
-    }
+    dispatch: Dispatch,
 }
 
 impl TriangleBvh {
@@ -150,7 +118,6 @@ impl TriangleBvh {
             root,
             depth: _,
         } = wide;
-        let instructions = Chosen::new(options.instructions);
         let tree = Self {
             nodes,
             blocks,
@@ -158,7 +125,7 @@ impl TriangleBvh {
             bounds,
             triangles: triangles.len(),
             stored: boxes.len(),
-            instructions,
+            dispatch: Dispatch::new(options.instructions),
         };
         debug_assert!(tree.is_valid());
         Ok(tree)
@@ -240,20 +207,20 @@ impl TriangleBvh {
 }
 
 impl Intersect for TriangleBvh {
+    #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        match self.instructions {
-            Chosen::Portable => traverse::closest_hit(Portable, self.tree(), ray),
-            #[cfg(target_arch = "x86_64")]
-            Chosen::Avx2(avx2) => avx2::closest_hit(avx2, self.tree(), ray),
-        }
+        self.dispatch.run(ClosestHit {
+            tree: self.tree(),
+            ray,
+        })
     }
 
+    #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        match self.instructions {
-            Chosen::Portable => traverse::is_occluded(Portable, self.tree(), ray),
-            #[cfg(target_arch = "x86_64")]
-            Chosen::Avx2(avx2) => avx2::is_occluded(avx2, self.tree(), ray),
-        }
+        self.dispatch.run(Occlusion {
+            tree: self.tree(),
+            ray,
+        })
     }
 }
 

@@ -3,9 +3,8 @@
 use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray, WatertightRay};
 
-use super::avx2::Stack;
-use super::lanes::Lanes;
 use super::layout::{Block, Child, Node};
+use crate::simd::{Kernel, Lanes, Row, Stack};
 
 /// What traversal reads.
 #[derive(Clone, Copy)]
@@ -13,6 +12,36 @@ pub(super) struct Tree<'a> {
     pub(super) nodes: &'a [Node],
     pub(super) blocks: &'a [Block],
     pub(super) root: Child,
+}
+
+/// The closest hit of a ray.
+pub(super) struct ClosestHit<'a> {
+    pub(super) tree: Tree<'a>,
+    pub(super) ray: &'a Ray,
+}
+
+impl Kernel for ClosestHit<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
+        closest_hit(lanes, self.tree, self.ray)
+    }
+}
+
+/// Whether a ray hits anything.
+pub(super) struct Occlusion<'a> {
+    pub(super) tree: Tree<'a>,
+    pub(super) ray: &'a Ray,
+}
+
+impl Kernel for Occlusion<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> bool {
+        is_occluded(lanes, self.tree, self.ray)
+    }
 }
 
 /// Entries that wait at most; see [`MAX_DEPTH`].
@@ -50,6 +79,11 @@ struct Prepared<F> {
     shear: [F; 3],
 }
 
+#[inline(always)]
+fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
+    [lanes.splat(x), lanes.splat(y), lanes.splat(z)]
+}
+
 impl<F: Copy> Prepared<F> {
     /// `None` for a ray that cannot hit anything: not finite, or an empty range.
     #[inline(always)]
@@ -67,18 +101,21 @@ impl<F: Copy> Prepared<F> {
         let axes = [(longest + 1) % 3, (longest + 2) % 3, longest];
         let along = inverse[longest];
         Some(Self {
-            origin: origin.map(|o| lanes.splat(o)),
-            inverse_near: inverse.map(|i| lanes.splat(i)),
-            inverse_far: inverse.map(|i| lanes.splat(i * WIDEN)),
+            origin: splat(lanes, origin),
+            inverse_near: splat(lanes, inverse),
+            inverse_far: splat(lanes, inverse.map(|i| i * WIDEN)),
             near_side: direction.map(|d| usize::from(d.is_sign_negative())),
             t_min: lanes.splat(t_min),
             axes,
-            sheared_origin: axes.map(|axis| lanes.splat(origin[axis])),
-            shear: [
-                lanes.splat(direction[axes[0]] / direction[longest]),
-                lanes.splat(direction[axes[1]] / direction[longest]),
-                lanes.splat(along),
-            ],
+            sheared_origin: splat(lanes, axes.map(|axis| origin[axis])),
+            shear: splat(
+                lanes,
+                [
+                    direction[axes[0]] / direction[longest],
+                    direction[axes[1]] / direction[longest],
+                    along,
+                ],
+            ),
         })
     }
 
@@ -104,6 +141,21 @@ impl<F: Copy> Prepared<F> {
         (near, lanes.bits(lanes.at_most(near, far)))
     }
 
+    /// Moves and shears eight vertices so that the ray becomes the z axis.
+    // Not a closure: those are compiled for the base instructions before they are inlined.
+    #[inline(always)]
+    fn project<L: Lanes<Floats = F>>(&self, lanes: L, rows: &[Row; 3]) -> (F, F, F) {
+        let [x, y, z] = self.axes;
+        let to_x = lanes.sub(lanes.load(&rows[x]), self.sheared_origin[0]);
+        let to_y = lanes.sub(lanes.load(&rows[y]), self.sheared_origin[1]);
+        let to_z = lanes.sub(lanes.load(&rows[z]), self.sheared_origin[2]);
+        (
+            lanes.sub(to_x, lanes.mul(self.shear[0], to_z)),
+            lanes.sub(to_y, lanes.mul(self.shear[1], to_z)),
+            to_z,
+        )
+    }
+
     /// Tests eight triangles: edge functions for the weights of the three vertices and their sum,
     /// the ray parameters, and the lanes that are hit between the ray's `t_min` and `limit`.
     ///
@@ -114,20 +166,9 @@ impl<F: Copy> Prepared<F> {
     /// as inside for both, so that an edge or vertex is never missed.
     #[inline(always)]
     fn hit<L: Lanes<Floats = F>>(&self, lanes: L, block: &Block, limit: F) -> BlockHits<F> {
-        let [x, y, z] = self.axes;
-        let project = |rows: &[super::layout::Row; 3]| {
-            let to_x = lanes.sub(lanes.load(&rows[x]), self.sheared_origin[0]);
-            let to_y = lanes.sub(lanes.load(&rows[y]), self.sheared_origin[1]);
-            let to_z = lanes.sub(lanes.load(&rows[z]), self.sheared_origin[2]);
-            (
-                lanes.sub(to_x, lanes.mul(self.shear[0], to_z)),
-                lanes.sub(to_y, lanes.mul(self.shear[1], to_z)),
-                to_z,
-            )
-        };
-        let (a_x, a_y, a_z) = project(&block.vertices[0]);
-        let (b_x, b_y, b_z) = project(&block.vertices[1]);
-        let (c_x, c_y, c_z) = project(&block.vertices[2]);
+        let (a_x, a_y, a_z) = self.project(lanes, &block.vertices[0]);
+        let (b_x, b_y, b_z) = self.project(lanes, &block.vertices[1]);
+        let (c_x, c_y, c_z) = self.project(lanes, &block.vertices[2]);
         let a = lanes.sub(lanes.mul(c_x, b_y), lanes.mul(c_y, b_x));
         let b = lanes.sub(lanes.mul(a_x, c_y), lanes.mul(a_y, c_x));
         let c = lanes.sub(lanes.mul(b_x, a_y), lanes.mul(b_y, a_x));
@@ -238,7 +279,7 @@ fn lower_end(ray: &Ray) -> f32 {
 }
 
 #[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
+fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
     let prepared = Prepared::new(lanes, ray, lower_end(ray))?;
     // Hits at exactly this parameter count, so that of two at the same place the one with the
     // lower index wins, whichever is found first.
@@ -246,7 +287,7 @@ pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Opti
     let mut limits = lanes.splat(limit);
     let mut widened = limit * WIDEN;
     let mut hit = None::<Hit>;
-    let mut stack = Stack::<STACK>::new();
+    let mut stack = Stack::<u64, STACK>::new();
     let mut current = tree.root;
     loop {
         while !current.is_leaf() {
@@ -333,14 +374,14 @@ pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Opti
 }
 
 #[inline(always)]
-pub(super) fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
+fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
     let Some(prepared) = Prepared::new(lanes, ray, lower_end(ray)) else {
         return false;
     };
     let limit = ray.t_max.next_down();
     let limits = lanes.splat(limit);
     let widened = lanes.splat(limit * WIDEN);
-    let mut stack = Stack::<STACK>::new();
+    let mut stack = Stack::<u64, STACK>::new();
     stack.push(u64::from(tree.root.0));
     while let Some(next) = stack.pop() {
         let current = child_of(next);

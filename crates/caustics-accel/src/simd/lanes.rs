@@ -1,12 +1,16 @@
 //! Arithmetic on eight lanes at once, so that the traversal is written only once.
 
-use super::layout::{Row, WIDTH};
+/// How many lanes there are.
+pub(crate) const WIDTH: usize = 8;
+
+/// One number for each lane.
+pub(crate) type Row = [f32; WIDTH];
 
 /// A set of eight-lane instructions.
 ///
 /// Every implementation rounds each operation as IEEE 754 demands and none contracts a product and
 /// a sum, so that all of them return the same bits.
-pub(super) trait Lanes: Copy {
+pub(crate) trait Lanes: Copy {
     /// One float for each lane.
     type Floats: Copy;
     /// One yes or no for each lane.
@@ -35,7 +39,7 @@ pub(super) trait Lanes: Copy {
 
 /// Plain arrays, which the compiler turns into whatever the target has (SSE2, NEON).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Portable;
+pub(crate) struct Portable;
 
 #[inline(always)]
 fn zip(a: Row, b: Row, f: impl Fn(f32, f32) -> f32) -> Row {

@@ -1,0 +1,110 @@
+//! AVX2 instructions.
+#![allow(unsafe_code)]
+
+use std::arch::x86_64::*;
+
+use super::Kernel;
+use super::lanes::{Lanes, Row};
+
+/// Proof that the processor has AVX2: there is no other way to make one than [`Avx2::detect`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Avx2(());
+
+impl Avx2 {
+    pub(super) fn detect() -> Option<Self> {
+        let found = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        found.then_some(Self(()))
+    }
+
+    /// Runs a kernel compiled for AVX2.
+    #[inline]
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        #[target_feature(enable = "avx2,bmi1,lzcnt,popcnt")]
+        fn compiled<K: Kernel>(avx2: Avx2, kernel: K) -> K::Output {
+            kernel.run(avx2)
+        }
+        // SAFETY: an `Avx2` exists only where all these features were detected.
+        unsafe { compiled(self, kernel) }
+    }
+}
+
+// SAFETY, of all blocks below: `self` proves that the processor has AVX2, which includes AVX.
+// None of the intrinsics but the load takes a pointer.
+impl Lanes for Avx2 {
+    type Floats = __m256;
+    type Mask = __m256;
+
+    #[inline(always)]
+    fn load(self, row: &Row) -> __m256 {
+        // SAFETY: a row is eight floats; the load needs no alignment.
+        unsafe { _mm256_loadu_ps(row.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, a: __m256) -> Row {
+        bytemuck::cast(a)
+    }
+
+    #[inline(always)]
+    fn splat(self, a: f32) -> __m256 {
+        unsafe { _mm256_set1_ps(a) }
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn less(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) }
+    }
+
+    #[inline(always)]
+    fn and(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_and_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn or(self, a: __m256, b: __m256) -> __m256 {
+        unsafe { _mm256_or_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn bits(self, mask: __m256) -> u32 {
+        unsafe { _mm256_movemask_ps(mask) as u32 }
+    }
+}
