@@ -1,6 +1,7 @@
 //! Triangle and photon acceleration structures.
 
 mod error;
+mod hash_grid;
 mod intersect;
 mod left_balanced_tree;
 mod neighbour;
@@ -9,6 +10,7 @@ mod simd;
 mod triangle_bvh;
 
 pub use error::AccelError;
+pub use hash_grid::HashGrid;
 pub use intersect::Intersect;
 pub use left_balanced_tree::LeftBalancedTree;
 pub use neighbour::{NearestScratch, Neighbour};

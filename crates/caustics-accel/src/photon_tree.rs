@@ -229,6 +229,25 @@ impl PhotonTree {
         });
     }
 
+    /// Renumbers the points in the order in which they lie in the tree and returns the former index
+    /// of each.
+    ///
+    /// Neighbours in space then have neighbouring numbers. Put what belongs to the points, such as
+    /// their flux, into the same order, and gathering it is fast: it comes from few cache lines.
+    pub fn renumber(&mut self) -> Vec<u32> {
+        let mut former = Vec::with_capacity(self.points);
+        for index in self
+            .buckets
+            .iter_mut()
+            .flat_map(|bucket| &mut bucket.indices)
+        {
+            if *index != u32::MAX {
+                former.push(std::mem::replace(index, former.len() as u32));
+            }
+        }
+        former
+    }
+
     /// Whether every node's halves keep to their sides and every index occurs once.
     fn is_valid(&self) -> bool {
         let mut seen = vec![false; self.points];
@@ -428,7 +447,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
             let Waiting {
                 mut subtree,
                 offset,
-                distance_squared,
+                ..
             } = waiting;
             while subtree.buckets > 1 {
                 let split = self.tree.splits[subtree.split as usize];
@@ -443,7 +462,6 @@ impl<C: Collector> Kernel for Search<'_, C> {
                     (right, left, to_left)
                 };
                 let before = offset[axis];
-                // Rounding must not make the distance too long: what is subtracted was added.
                 let mut far_offset = offset;
                 far_offset[axis] = to_far.max(before);
                 let [x, y, z] = far_offset;
@@ -457,7 +475,6 @@ impl<C: Collector> Kernel for Search<'_, C> {
                 }
                 subtree = near;
             }
-            let _ = distance_squared;
             let bucket = &self.tree.buckets[subtree.bucket as usize];
             for half in 0..2 {
                 let mut distances = [rows[0]; 3];

@@ -87,7 +87,7 @@ impl Caustics {
         if !world.is_lit() {
             return Err(CausticsError::NoLight);
         }
-        let intersector = SceneIntersector::new(&world, &options.bvh)?;
+        let intersector = world.intersector(&options.bvh)?;
         let build = start.elapsed().as_secs_f64();
         progress(Progress { stage: Stage::Build, finished: 1, total: 1 });
 
