@@ -272,6 +272,11 @@ fn scaling_scales_all_derivatives() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::with_cases(5_000)
+    })]
+
     /// With two parameters the axes are the displacements, with four their covariance is kept.
     #[test]
     fn axes_keep_the_covariance(
