@@ -3,5 +3,6 @@
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod meshes;
+pub mod photons;
 pub mod random;
 pub mod rays;

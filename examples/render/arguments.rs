@@ -14,11 +14,11 @@ Renders the caustics of a glTF 2.0 file, or without one of the built-in cognac g
 usage: render [options] [scene.glb | scene.gltf]
 
   --width N, --height N     size of the picture in pixels           (1024 x 768)
-  --photons N               photons emitted, by all lights together (1000000)
+  --photons N               photons emitted, by all lights together (262144)
   --samples N               eye rays a pixel                        (4)
   --seed N                  chooses the random numbers              (0)
   --camera N                which camera of the file                (0)
-  --estimate NAME           how photons become light                (nearest)
+  --estimate NAME           how photons become light                (grid-gaussian)
   --list-estimates          name all estimates
   --visibility direct|full  caustics only where the camera sees the receiver itself,
                             or also through glass and in mirrors    (full)
@@ -30,7 +30,7 @@ usage: render [options] [scene.glb | scene.gltf]
   --kernel NAME             their weight by distance: box, cone, epanechnikov, gaussian,
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
-                                                                    (roulette)
+                                                                    (split-all)
   --aim NAME                where lights aim: casters, everywhere   (casters)
   --out FILE.png            the picture                             (caustics.png)
   --caustics-only FILE.exr  the caustics alone, linear radiance
@@ -39,7 +39,7 @@ usage: render [options] [scene.glb | scene.gltf]
   --help                    this text";
 
 /// What the user wants.
-pub enum Request {
+pub(crate) enum Request {
     /// Only this text.
     Print(String),
     /// A picture.
@@ -47,7 +47,7 @@ pub enum Request {
 }
 
 /// What to render and where to.
-pub struct Arguments {
+pub(crate) struct Arguments {
     pub scene: Option<PathBuf>,
     pub camera: usize,
     pub caustics: CausticsOptions,
@@ -78,7 +78,7 @@ impl Default for Arguments {
 }
 
 /// Reads the arguments that follow the program's name.
-pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request, String> {
+pub(crate) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request, String> {
     let mut parser = Parser::from_args(arguments);
     let mut result = Arguments::default();
     while let Some(argument) = parser.next().map_err(|error| error.to_string())? {
@@ -121,8 +121,11 @@ impl Arguments {
             "neighbours" => self.caustics.nearest.count = number(name, parser)?,
             "radius" => self.caustics.nearest.max_radius = Some(finite(name, parser)?),
             "estimate" => {
-                self.caustics.estimate =
-                    choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
+                let estimate = choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
+                let preset = CausticsOptions::for_estimate(estimate);
+                self.caustics.estimate = estimate;
+                self.caustics.trace.sequence = preset.trace.sequence;
+                self.caustics.footprint.kernel = preset.footprint.kernel;
             }
             "kernel" => {
                 let kernels = Kernel::ALL.map(|it| (it.name(), it));

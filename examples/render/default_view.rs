@@ -4,7 +4,7 @@ use caustics::glam::Vec3;
 use caustics::prelude::*;
 
 /// Adds what the scene lacks to be seen, and says so.
-pub fn complete(scene: &mut Scene) -> Vec<String> {
+pub(crate) fn complete(scene: &mut Scene) -> Vec<String> {
     let mut notices = Vec::new();
     let Ok(world) = World::new(scene) else {
         // The caller meets the same error where it can report it.
@@ -13,8 +13,8 @@ pub fn complete(scene: &mut Scene) -> Vec<String> {
     let (center, radius) = world.bounds().bounding_sphere();
     if scene.cameras().is_empty() {
         let eye = center + radius * Vec3::new(0.6, 1.0, 1.9);
-        let camera = Camera::look_at(eye, center, Vec3::Y, 0.8);
-        if camera.and_then(|camera| scene.add_camera(camera)).is_ok() {
+        let camera = Camera::look_at("default", eye, center, Vec3::Y, 0.8);
+        if camera.is_ok_and(|camera| scene.add_camera(camera).is_ok()) {
             notices.push("the file has no camera: one looks at the whole scene".into());
         }
     }

@@ -1,6 +1,6 @@
 //! Nearest-neighbour and radius searches against brute force.
 
-use caustics_accel::{LeftBalancedTree, NearestScratch, PhotonTree};
+use caustics_accel::{HashGrid, LeftBalancedTree, NearestScratch, PhotonTree};
 use caustics_geometry::glam::Vec3;
 use proptest::prelude::*;
 
@@ -14,6 +14,21 @@ fn sorted(positions: &[Vec3], point: Vec3) -> Vec<(f32, u32)> {
     all
 }
 
+/// That a structure finds all points within a radius, once.
+macro_rules! check_within {
+    ($tree:expr, $positions:expr, $point:expr, $radius:expr) => {{
+        let (positions, point, radius): (&[Vec3], Vec3, f32) = ($positions, $point, $radius);
+        let mut expected = sorted(positions, point);
+        expected.retain(|(distance_squared, _)| *distance_squared <= radius * radius);
+        let mut inside = Vec::new();
+        $tree.within(point, radius, |index, distance_squared| {
+            inside.push((distance_squared, index));
+        });
+        inside.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        assert_eq!(inside, expected, "within {radius} of {point}");
+    }};
+}
+
 /// Everything that a structure promises, for one query.
 macro_rules! check {
     ($tree:expr, $positions:expr, $point:expr, $count:expr, $radius:expr) => {{
@@ -23,12 +38,7 @@ macro_rules! check {
         let mut expected = sorted(positions, point);
         expected.retain(|(distance_squared, _)| *distance_squared <= radius * radius);
 
-        let mut inside = Vec::new();
-        $tree.within(point, radius, |index, distance_squared| {
-            inside.push((distance_squared, index));
-        });
-        inside.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        assert_eq!(inside, expected, "within {radius} of {point}");
+        check_within!($tree, positions, point, radius);
 
         let odd: Vec<(f32, u32)> = expected
             .iter()
@@ -71,6 +81,11 @@ macro_rules! check_all {
         for (point, count, radius) in $queries {
             check!(left_balanced, positions, point, count, radius);
             check!(photon_tree, positions, point, count, radius);
+            for cells in [0.1, 1.0, 2.0] {
+                let size = (radius * cells).clamp(1e-6, 1e6);
+                let grid = HashGrid::new(positions, size).unwrap();
+                check_within!(grid, positions, point, radius);
+            }
         }
     }};
 }
@@ -108,7 +123,7 @@ proptest! {
         } else {
             let low = positions.iter().copied().reduce(Vec3::min).unwrap();
             let high = positions.iter().copied().reduce(Vec3::max).unwrap();
-            (positions[choice.index(positions.len())], (high - low).max_element() / 16.0)
+            (positions[choice.index(positions.len())], ((high - low).max_element() / 16.0).max(1e-6))
         };
         let off = centre + Vec3::from_array(offset) * scale;
         let queries = [(off, count, radius * scale), (centre, count, radius * scale),
@@ -162,4 +177,25 @@ fn trees_do_not_depend_on_the_run() {
     assert!(orders[0].len() > 1000);
     assert_eq!(orders[0], orders[1]);
     assert_eq!(orders[0], orders[2]);
+}
+
+#[test]
+fn renumbered_points_keep_their_places() {
+    let positions: Vec<Vec3> = (0..1000_u32)
+        .map(|i| Vec3::new((i * 37 % 101) as f32, (i * 53 % 89) as f32, 1.0))
+        .collect();
+    let mut tree = PhotonTree::new(&positions).unwrap();
+    let mut grid = HashGrid::new(&positions, 10.0).unwrap();
+    for former in [tree.renumber(), grid.renumber()] {
+        let mut all = former.clone();
+        all.sort_unstable();
+        assert!(all.iter().copied().eq(0..1000));
+    }
+    let sorted: Vec<Vec3> = PhotonTree::new(&positions)
+        .unwrap()
+        .renumber()
+        .iter()
+        .map(|&i| positions[i as usize])
+        .collect();
+    check!(tree, &sorted, Vec3::new(50.0, 40.0, 3.0), 77, 20.0);
 }

@@ -28,6 +28,24 @@ pub enum RenderError {
         /// The radius, in metres.
         radius: f32,
     },
+    /// A footprint scale that is not a positive number.
+    #[error("the footprint scale {scale} is not a positive, finite number of sample spacings")]
+    InvalidScale {
+        /// The scale, in sample spacings.
+        scale: f32,
+    },
+    /// A limit on anisotropy below that of a disc.
+    #[error("the anisotropy limit {max_anisotropy} is not at least 1")]
+    InvalidAnisotropy {
+        /// The limit.
+        max_anisotropy: f32,
+    },
+    /// A photon with a NaN or infinite number in it.
+    #[error("photon {photon} is not finite")]
+    NonFinitePhoton {
+        /// Index of the first such photon.
+        photon: usize,
+    },
     /// A structure that photons are found with could not be built.
     #[error(transparent)]
     Accel(#[from] AccelError),

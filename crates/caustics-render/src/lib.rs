@@ -1,17 +1,28 @@
 //! To be written.
 
+mod columns;
 mod direct;
 mod error;
 mod estimate;
 mod eye;
+mod footprint;
+mod footprint_gather;
+mod gbuffer;
 mod nearest;
 mod picture;
 mod pixel;
+mod screen;
+mod splat;
+mod thinning;
 
 pub use direct::DirectLight;
 pub use error::RenderError;
 pub use estimate::Estimate;
 pub use eye::{EyeTracer, Receiver};
+pub use footprint::{FootprintKernel, FootprintOptions};
+pub use footprint_gather::{FootprintGather, GatherStats};
+pub use gbuffer::{GBuffer, Texel};
 pub use glam;
 pub use nearest::{NearestEstimate, NearestOptions};
-pub use picture::{Picture, PictureOptions, Visibility, render};
+pub use splat::{SplatStats, splat};
+pub use picture::{CausticSource, Picture, PictureOptions, Visibility, render};

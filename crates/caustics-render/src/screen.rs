@@ -45,6 +45,12 @@ impl Screen {
         (point - self.eye).dot(self.forward)
     }
 
+    /// The cosine between a surface's normal and the direction to the eye, up to a positive factor.
+    pub(crate) fn facing(&self, point: Vec3, normal: Vec3) -> f32 {
+        let view = if self.is_perspective { point - self.eye } else { self.forward };
+        -view.dot(normal)
+    }
+
     /// The pixel coordinates of a point in front of the camera; `None` behind it.
     pub(crate) fn project(&self, point: Vec3) -> Option<Vec2> {
         let relative = point - self.eye;

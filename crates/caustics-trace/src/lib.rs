@@ -1,5 +1,7 @@
 //! To be written.
 
+mod aim;
+mod area_emission;
 mod differential;
 mod emission;
 mod ledger;
@@ -12,7 +14,7 @@ mod trace;
 mod tracer;
 
 pub use differential::RayDifferential;
-pub use emission::{Emission, Emitter};
+pub use emission::{Emission, EmissionSample, Emitter};
 pub use glam;
 pub use ledger::{EnergyLedger, Fate, LedgerEntry};
 pub use media::{Crossing, MediumStack};

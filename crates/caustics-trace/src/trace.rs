@@ -2,7 +2,7 @@ use caustics_accel::Intersect;
 use caustics_sampling::{CounterRng, PointSet, apportion};
 use caustics_scene::World;
 
-use crate::emission::Emitter;
+use crate::emission::{EmissionSample, Emitter};
 use crate::media::MediumStack;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
@@ -98,8 +98,8 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
         let mut tracer = PathTracer::<I, N>::new(self.world, self.intersect, self.options);
         let points = PointSet::new(self.options.sequence, self.count, self.options.seed);
         for index in range {
-            let sample = std::array::from_fn(|dimension| points.sample(index, dimension as u32));
-            let Some(emission) = self.emitter.emit::<N>(sample, self.count) else {
+            let sample = EmissionSample::of(&points, index);
+            let Some(emission) = self.emitter.emit::<N>(&sample) else {
                 continue;
             };
             let mut rng = CounterRng::new(self.options.seed, u64::from(self.first + index));

@@ -1,0 +1,134 @@
+use glam::Vec3;
+
+use crate::footprint::{Density, FootprintKernel, Gate};
+use crate::gbuffer::Texel;
+
+/// Points in space or directions, each coordinate in a list of its own, so that loops over many
+/// use vector instructions.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Columns {
+    pub(crate) x: Vec<f32>,
+    pub(crate) y: Vec<f32>,
+    pub(crate) z: Vec<f32>,
+}
+
+impl Columns {
+    pub(crate) fn zero(count: usize) -> Self {
+        Self { x: vec![0.0; count], y: vec![0.0; count], z: vec![0.0; count] }
+    }
+
+    pub(crate) fn get(&self, index: usize) -> Vec3 {
+        Vec3::new(self.x[index], self.y[index], self.z[index])
+    }
+
+    pub(crate) fn set(&mut self, index: usize, value: Vec3) {
+        [self.x[index], self.y[index], self.z[index]] = value.to_array();
+    }
+
+    /// The lists in pieces of `size`, in order.
+    pub(crate) fn chunks_mut(&mut self, size: usize) -> impl Iterator<Item = ColumnsMut<'_>> {
+        let zip = self.x.chunks_mut(size).zip(self.y.chunks_mut(size)).zip(self.z.chunks_mut(size));
+        zip.map(|((x, y), z)| ColumnsMut { x, y, z })
+    }
+}
+
+/// A part of [`Columns`].
+pub(crate) struct ColumnsMut<'a> {
+    pub(crate) x: &'a mut [f32],
+    pub(crate) y: &'a mut [f32],
+    pub(crate) z: &'a mut [f32],
+}
+
+/// Positions and normals of texels; a pixel without one has a zero normal and is never lit.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TexelColumns {
+    position: Columns,
+    normal: Columns,
+}
+
+impl TexelColumns {
+    pub(crate) fn new(texels: &[Option<Texel>]) -> Self {
+        let mut columns =
+            Self { position: Columns::zero(texels.len()), normal: Columns::zero(texels.len()) };
+        for (index, texel) in texels.iter().enumerate() {
+            if let Some(texel) = texel {
+                columns.position.set(index, texel.position);
+                columns.normal.set(index, texel.normal);
+            }
+        }
+        columns
+    }
+
+    /// Adds a photon's light to the irradiance of `count` texels from `first` on; that of the
+    /// first is at `target`.
+    pub(crate) fn light(
+        &self,
+        density: &Density,
+        gate: &Gate,
+        first: usize,
+        count: usize,
+        irradiance: &mut ColumnsMut<'_>,
+        target: usize,
+    ) {
+        // One loop for each kernel, so that none asks in its midst which one it is.
+        macro_rules! with {
+            ($kernel:expr) => {
+                self.light_by(density, gate, first, count, irradiance, target, |u, v| {
+                    $kernel.density(u, v)
+                })
+            };
+        }
+        match density.lighting().kernel {
+            FootprintKernel::Gaussian => with!(FootprintKernel::Gaussian),
+            FootprintKernel::Ellipse => with!(FootprintKernel::Ellipse),
+            FootprintKernel::Disc => with!(FootprintKernel::Disc),
+            FootprintKernel::Tent => with!(FootprintKernel::Tent),
+        }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the same as `light`, and its kernel")]
+    #[inline]
+    fn light_by(
+        &self,
+        density: &Density,
+        gate: &Gate,
+        first: usize,
+        count: usize,
+        irradiance: &mut ColumnsMut<'_>,
+        target: usize,
+        kernel: impl Fn(f32, f32) -> f32,
+    ) {
+        let read = first..first + count;
+        let write = target..target + count;
+        let (px, py, pz) = (
+            &self.position.x[read.clone()],
+            &self.position.y[read.clone()],
+            &self.position.z[read.clone()],
+        );
+        let (nx, ny, nz) =
+            (&self.normal.x[read.clone()], &self.normal.y[read.clone()], &self.normal.z[read]);
+        let red = &mut irradiance.x[write.clone()];
+        let green = &mut irradiance.y[write.clone()];
+        let blue = &mut irradiance.z[write];
+        let lighting = density.lighting();
+        let (center, normal, incoming) = (density.center, density.normal, density.incoming);
+        let (gu, gv, strength) =
+            (*lighting.u_gradient, *lighting.v_gradient, *lighting.strength);
+        for i in 0..count {
+            let (dx, dy, dz) = (px[i] - center.x, py[i] - center.y, pz[i] - center.z);
+            let u = dx * gu.x + dy * gu.y + dz * gu.z;
+            let v = dx * gv.x + dy * gv.y + dz * gv.z;
+            let off = dx * normal.x + dy * normal.y + dz * normal.z;
+            let alike = nx[i] * normal.x + ny[i] * normal.y + nz[i] * normal.z;
+            let cosine = -(nx[i] * incoming.x + ny[i] * incoming.y + nz[i] * incoming.z);
+            let is_before = (off >= 0.0) & (off <= gate.reach);
+            let is_beyond = (off >= -gate.plane_distance) & (alike >= gate.normal_cosine);
+            let is_lit = is_before | (is_beyond & (off < 0.0));
+            let weight = kernel(u, v) * cosine.max(0.0);
+            let weight = if is_lit { weight } else { 0.0 };
+            red[i] += strength.x * weight;
+            green[i] += strength.y * weight;
+            blue[i] += strength.z * weight;
+        }
+    }
+}

@@ -1,0 +1,199 @@
+use caustics_accel::Intersect;
+use caustics_geometry::Ray;
+use caustics_scene::{Camera, Surface, World};
+use glam::Vec3;
+
+use crate::error::RenderError;
+use crate::picture::PictureOptions;
+use crate::screen::Screen;
+
+/// Samples along each side of a pixel that holds an edge.
+const EDGE_SAMPLES: u32 = 4;
+
+/// The least cosine between the normals of two samples of one smooth surface.
+const SMOOTH_COSINE: f32 = 0.98;
+
+/// A receiver, or the part of one, that a pixel sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texel {
+    /// A point of it, in metres.
+    pub position: Vec3,
+    /// Unit geometric normal on the side that is seen.
+    pub normal: Vec3,
+    /// Reflectance for each channel, times the part of the pixel that it fills.
+    pub albedo: Vec3,
+    /// Index among the world's objects.
+    pub object: u32,
+}
+
+/// The receivers that a camera sees without a glass or a mirror between: what footprints are
+/// splatted to.
+///
+/// A pixel inside a surface has one texel. A pixel that an edge goes through has one for each
+/// surface in it, weighted by how much of the pixel it fills, so that a caustic is as
+/// smooth along an edge as a picture with many samples a pixel.
+#[derive(Clone, Debug)]
+pub struct GBuffer {
+    pub(crate) screen: Screen,
+    /// The largest part of each pixel, row by row.
+    pub(crate) texels: Vec<Option<Texel>>,
+    /// The further parts, ordered by pixel.
+    pub(crate) extras: Vec<(u32, Texel)>,
+    rays: u64,
+}
+
+impl GBuffer {
+    /// Looks at the world through a camera.
+    ///
+    /// # Errors
+    /// If the size is out of range.
+    pub fn new<I: Intersect + ?Sized>(
+        world: &World,
+        intersect: &I,
+        camera: &Camera,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, RenderError> {
+        PictureOptions { width, height, ..PictureOptions::default() }.validate()?;
+        let looker = Looker { world, intersect, camera, width, height };
+        let rows = in_rows(height, |y| looker.row(y));
+        let centers: Vec<Option<Texel>> = rows.into_iter().flatten().collect();
+        let refined = in_rows(height, |y| looker.refine_row(y, &centers));
+
+        let mut buffer = Self {
+            screen: Screen::new(camera, width, height),
+            texels: centers.clone(),
+            extras: Vec::new(),
+            rays: centers.len() as u64,
+        };
+        for (pixel, parts) in refined.into_iter().flatten() {
+            buffer.rays += u64::from(EDGE_SAMPLES * EDGE_SAMPLES);
+            let mut parts = parts.into_iter();
+            buffer.texels[pixel as usize] = parts.next();
+            buffer.extras.extend(parts.map(|part| (pixel, part)));
+        }
+        Ok(buffer)
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.screen.width
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.screen.height
+    }
+
+    /// Rays that it took.
+    #[must_use]
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+}
+
+/// Computes rows of a picture, in parallel where the feature allows, in their order.
+pub(crate) fn in_rows<T: Send>(height: u32, row: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        (0..height).into_par_iter().map(row).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    (0..height).map(row).collect()
+}
+
+struct Looker<'a, I: ?Sized> {
+    world: &'a World,
+    intersect: &'a I,
+    camera: &'a Camera,
+    width: u32,
+    height: u32,
+}
+
+impl<I: Intersect + ?Sized> Looker<'_, I> {
+    fn row(&self, y: u32) -> Vec<Option<Texel>> {
+        (0..self.width).map(|x| self.look(x as f32 + 0.5, y as f32 + 0.5)).collect()
+    }
+
+    fn look(&self, x: f32, y: f32) -> Option<Texel> {
+        let ray: Ray = self.camera.ray(x, y, self.width, self.height);
+        let hit = self.intersect.closest_hit(&ray)?;
+        let point = self.world.surface(&ray, &hit)?;
+        let Surface::Diffuse { albedo } = self.world.materials()[point.material as usize].surface
+        else {
+            return None;
+        };
+        let side = if point.from_outside { 1.0 } else { -1.0 };
+        let texel = Texel {
+            position: point.spawn.position,
+            normal: side * point.geometric_normal,
+            albedo,
+            object: point.object,
+        };
+        Some(texel)
+    }
+
+    /// The parts of each pixel of a row that holds an edge, the largest first.
+    fn refine_row(&self, y: u32, centers: &[Option<Texel>]) -> Vec<(u32, Vec<Texel>)> {
+        let at = |x: u32, y: u32| &centers[(y * self.width + x) as usize];
+        (0..self.width)
+            .filter(|&x| {
+                let center = at(x, y);
+                let differs = |other: &Option<Texel>| !is_smooth(center, other);
+                (x > 0 && differs(at(x - 1, y)))
+                    || (x + 1 < self.width && differs(at(x + 1, y)))
+                    || (y > 0 && differs(at(x, y - 1)))
+                    || (y + 1 < self.height && differs(at(x, y + 1)))
+            })
+            .map(|x| (y * self.width + x, self.parts(x, y)))
+            .collect()
+    }
+
+    fn parts(&self, x: u32, y: u32) -> Vec<Texel> {
+        let mut parts: Vec<(Texel, u32)> = Vec::new();
+        let step = 1.0 / EDGE_SAMPLES as f32;
+        for sample in 0..EDGE_SAMPLES * EDGE_SAMPLES {
+            let column = (sample % EDGE_SAMPLES) as f32 + 0.5;
+            let row = (sample / EDGE_SAMPLES) as f32 + 0.5;
+            let Some(seen) = self.look(x as f32 + column * step, y as f32 + row * step) else {
+                continue;
+            };
+            match parts.iter_mut().find(|(part, _)| part.is_like(&seen)) {
+                Some((part, count)) => {
+                    part.position += seen.position;
+                    *count += 1;
+                }
+                None => parts.push((seen, 1)),
+            }
+        }
+        parts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+        let share = step * step;
+        parts
+            .into_iter()
+            .map(|(part, count)| Texel {
+                position: part.position / count as f32,
+                albedo: part.albedo * (count as f32 * share),
+                ..part
+            })
+            .collect()
+    }
+}
+
+impl Texel {
+    /// Whether two samples lie on one smooth surface.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.object == other.object && self.normal.dot(other.normal) > SMOOTH_COSINE
+    }
+}
+
+/// Whether no edge goes between two neighbouring pixels' middles.
+fn is_smooth(one: &Option<Texel>, other: &Option<Texel>) -> bool {
+    match (one, other) {
+        (None, None) => true,
+        (Some(one), Some(other)) => one.is_like(other),
+        _ => false,
+    }
+}

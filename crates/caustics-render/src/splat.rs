@@ -1,0 +1,525 @@
+use caustics_filter::Image;
+use caustics_trace::Photon;
+use glam::{DVec3, Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
+
+use crate::columns::{Columns, ColumnsMut, TexelColumns};
+use crate::footprint::{Density, FootprintOptions, Gate};
+use crate::gbuffer::{GBuffer, Texel};
+use crate::error::RenderError;
+use crate::screen::Screen;
+
+/// Rows of one task.
+const BAND: usize = 16;
+
+/// Photons that are prepared at a time, to bound the memory.
+const BATCH: usize = 1 << 17;
+
+/// Pixels a side of a level's pixel on the level below.
+const STRIDE: u32 = 2;
+
+/// Levels of resolution.
+const LEVELS: usize = 7;
+
+/// The least standard deviation of a footprint, in pixels of a level, that may be splatted there:
+/// linear interpolation between the level's pixels then errs by 3 % of the footprint's peak.
+const LEVEL_SIGMA: f32 = 2.0;
+
+/// Footprints with a standard deviation below this many pixels are normalised by their own sum.
+const SMALL_SIGMA: f32 = 0.9;
+
+/// What became of the photons that were splatted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SplatStats {
+    /// Photons whose footprint overlaps the picture.
+    pub splatted: u64,
+    /// Photons whose footprint lies outside the picture or behind the camera.
+    pub outside: u64,
+    /// Photons on a receiver that shows the camera its other side.
+    pub turned_away: u64,
+    /// Photons whose footprint is not a finite number.
+    pub invalid: u64,
+    /// Flux that reached texels, in watts.
+    pub deposited: DVec3,
+}
+
+/// Radiance of the caustics at every pixel of a G-buffer, in W/(sr m²): each photon spread over
+/// its footprint, each footprint blurred by the pixel that sees it.
+///
+/// The work is done in bands of rows, each in the order of the photons: the result does not depend
+/// on the number of threads.
+///
+/// # Errors
+/// If the options are out of range or memory cannot be had.
+pub fn splat(
+    buffer: &GBuffer,
+    photons: &[Photon],
+    options: &FootprintOptions,
+) -> Result<(Image, SplatStats), RenderError> {
+    options.validate()?;
+    let mut levels: Vec<Level> = vec![Level::finest(buffer)];
+    while levels.len() < LEVELS {
+        let next = levels[levels.len() - 1].coarser();
+        levels.push(next);
+    }
+    let mut stats = SplatStats::default();
+    for batch in photons.chunks(BATCH) {
+        let prepared = prepare(batch, &buffer.screen, options);
+        for fate in &prepared {
+            match fate {
+                Prepared::Splat(_) => stats.splatted += 1,
+                Prepared::Outside => stats.outside += 1,
+                Prepared::TurnedAway => stats.turned_away += 1,
+                Prepared::Invalid => stats.invalid += 1,
+            }
+        }
+        for (number, level) in levels.iter_mut().enumerate() {
+            stats.deposited += level.accumulate(&prepared, number);
+        }
+    }
+    while let Some(coarse) = levels.pop() {
+        match levels.last_mut() {
+            Some(fine) => fine.add_coarser(&coarse),
+            None => return Ok((coarse.radiance()?, stats)),
+        }
+    }
+    Ok((Image::new(buffer.width(), buffer.height())?, stats))
+}
+
+/// A photon made ready for one level of the picture.
+#[derive(Clone, Copy, Debug)]
+struct Splat {
+    density: Density,
+    gate: Gate,
+    level: u8,
+    /// Whether a pixel's coordinates tell where it lies in the footprint; if not, every pixel of
+    /// the rows and columns is asked.
+    is_local: bool,
+    /// Middle, in pixels of the level.
+    center: Vec2,
+    /// What a step of one pixel of the level along x and y adds to the footprint's coordinates.
+    step_x: Vec2,
+    step_y: Vec2,
+    columns: [u16; 2],
+    rows: [u16; 2],
+}
+
+enum Prepared {
+    Splat(Splat),
+    Outside,
+    TurnedAway,
+    Invalid,
+}
+
+fn prepare(photons: &[Photon], screen: &Screen, options: &FootprintOptions) -> Vec<Prepared> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        photons
+            .par_iter()
+            .with_min_len(1024)
+            .map(|photon| Splat::prepare(photon, screen, options))
+            .collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    photons.iter().map(|photon| Splat::prepare(photon, screen, options)).collect()
+}
+
+impl Splat {
+    fn prepare(photon: &Photon, screen: &Screen, options: &FootprintOptions) -> Prepared {
+        if screen.facing(photon.position, photon.normal) <= 0.0 {
+            return Prepared::TurnedAway;
+        }
+        let pixel = screen.pixel_axes(photon.position, photon.normal);
+        let Some(mut density) = Density::new(photon, pixel, options) else {
+            return Prepared::Invalid;
+        };
+        let bounds = Bounds::of(&density, screen);
+        let Some(bounds) = bounds.clipped(screen) else {
+            return Prepared::Outside;
+        };
+        let steps = pixel.map(|[x, y]| [density.along(x), density.along(y)].map(Vec2::from));
+        let center = screen.project(photon.position);
+        let is_local = bounds.is_exact && steps.is_some() && center.is_some();
+        let ([step_x, step_y], center) =
+            (steps.unwrap_or_default(), center.unwrap_or_default());
+        let sigma = if is_local { least_sigma(step_x, step_y) } else { f32::INFINITY };
+        if sigma < SMALL_SIGMA {
+            density.scale_by(normalisation(&density, center, step_x, step_y));
+        }
+        let mut splat = Self {
+            gate: density.gate(),
+            density,
+            level: 0,
+            is_local,
+            center,
+            step_x,
+            step_y,
+            columns: [0; 2],
+            rows: [0; 2],
+        };
+        splat.choose_level(sigma);
+        splat.place(&bounds, screen);
+        Prepared::Splat(splat)
+    }
+
+    fn choose_level(&mut self, mut sigma: f32) {
+        let stride = STRIDE as f32;
+        while sigma >= LEVEL_SIGMA * stride && usize::from(self.level) + 1 < LEVELS {
+            self.level += 1;
+            sigma /= stride;
+            self.center /= stride;
+            self.step_x *= stride;
+            self.step_y *= stride;
+        }
+    }
+
+    /// The pixels of the level whose middles may lie in the footprint.
+    fn place(&mut self, bounds: &Bounds, screen: &Screen) {
+        let stride = STRIDE.pow(u32::from(self.level));
+        let range = |low: f32, high: f32, size: u32| {
+            let size = size.div_ceil(stride);
+            let first = (low / stride as f32 - 1.0).floor().max(0.0) as u32;
+            let last = (high / stride as f32 + 1.0).ceil().max(0.0) as u32;
+            [first.min(size) as u16, last.min(size) as u16]
+        };
+        self.columns = range(bounds.low.x, bounds.high.x, screen.width);
+        self.rows = range(bounds.low.y, bounds.high.y, screen.height);
+    }
+
+    /// The pixels of a row whose middles lie in the footprint.
+    fn span(&self, row: usize) -> Range<usize> {
+        let [first, last] = self.columns.map(usize::from);
+        if !self.is_local {
+            return first..last;
+        }
+        // |x step_x + y step_y|² = cut, for the x of the ends.
+        let y = row as f32 + 0.5 - self.center.y;
+        let across = y * self.step_y;
+        let a = self.step_x.length_squared();
+        let b = self.step_x.dot(across);
+        let c = across.length_squared() - self.density.cut();
+        let discriminant = b * b - a * c;
+        if discriminant <= 0.0 || a <= 0.0 {
+            return 0..0;
+        }
+        let half = discriminant.sqrt() / a;
+        let middle = self.center.x - b / a - 0.5;
+        // A texel's point need not be the pixel's middle: one more on either side.
+        let low = (middle - half).floor().clamp(first as f32, last as f32) as usize;
+        let high = ((middle + half).ceil() + 1.0).clamp(low as f32, last as f32) as usize;
+        low..high
+    }
+
+    /// What the photon adds to the irradiance of a texel.
+    #[inline]
+    fn irradiance(&self, texel: &Texel) -> Vec3 {
+        if self.gate.admits(&self.density, texel.position, texel.normal) {
+            self.density.irradiance(texel.position, texel.normal)
+        } else {
+            Vec3::ZERO
+        }
+    }
+}
+
+/// The smallest standard deviation across the screen, in pixels.
+fn least_sigma(step_x: Vec2, step_y: Vec2) -> f32 {
+    // The largest singular value of the steps is one over it.
+    let (xx, yy, xy) = (step_x.length_squared(), step_y.length_squared(), step_x.dot(step_y));
+    let mean = 0.5 * (xx + yy);
+    let half = 0.5 * (xx - yy);
+    (mean + (half * half + xy * xy).sqrt()).sqrt().recip()
+}
+
+/// By how much a small footprint must be brighter so that its values at the pixels' middles sum to
+/// its flux, whether or not those pixels see its receiver.
+fn normalisation(density: &Density, center: Vec2, step_x: Vec2, step_y: Vec2) -> f32 {
+    let area = step_x.perp_dot(step_y).abs();
+    // Extents of the ellipse along the pixel axes.
+    let reach = density.cut().sqrt() / area;
+    let extent = Vec2::new(step_y.length(), step_x.length()) * reach;
+    if extent.max_element() > 64.0 {
+        return 1.0;
+    }
+    let low = (center - extent - 0.5).floor();
+    let high = (center + extent - 0.5).ceil();
+    let mut sum = 0.0;
+    let mut y = low.y;
+    while y <= high.y {
+        let mut x = low.x;
+        while x <= high.x {
+            let offset = Vec2::new(x + 0.5, y + 0.5) - center;
+            let at = offset.x * step_x + offset.y * step_y;
+            sum += density.kernel_at(at);
+            x += 1.0;
+        }
+        y += 1.0;
+    }
+    let sum = sum * area;
+    if sum > 0.05 { sum.recip() } else { 1.0 }
+}
+
+/// The part of the screen that a footprint may overlap, in pixels.
+struct Bounds {
+    low: Vec2,
+    high: Vec2,
+    is_exact: bool,
+}
+
+impl Bounds {
+    fn of(density: &Density, screen: &Screen) -> Self {
+        let [a, b] = density.half_extents();
+        // A perspective map takes the corners' hull to the corners' hull as long as all are in
+        // front of the camera; close to it the map is too uneven to be followed linearly.
+        let near = 0.3 * screen.depth(density.center).abs();
+        let corners = [a + b, a - b, b - a, -a - b].map(|corner| density.center + corner);
+        if corners.iter().all(|&corner| screen.depth(corner) > near)
+            && let [Some(p), Some(q), Some(r), Some(s)] =
+                corners.map(|corner| screen.project(corner))
+        {
+            return Self {
+                low: p.min(q).min(r).min(s),
+                high: p.max(q).max(r).max(s),
+                is_exact: true,
+            };
+        }
+        let high = Vec2::new(screen.width as f32, screen.height as f32);
+        Self { low: Vec2::ZERO, high, is_exact: false }
+    }
+
+    fn clipped(self, screen: &Screen) -> Option<Self> {
+        let size = Vec2::new(screen.width as f32, screen.height as f32);
+        let overlaps = self.high.cmpge(Vec2::ZERO).all() && self.low.cmple(size).all();
+        overlaps.then_some(self)
+    }
+}
+
+/// The irradiance of a picture's texels at one resolution.
+struct Level {
+    width: usize,
+    height: usize,
+    texels: Vec<Option<Texel>>,
+    columns: TexelColumns,
+    irradiance: Columns,
+    extras: Vec<(u32, Texel)>,
+    extra_irradiance: Vec<Vec3>,
+    /// For each band, where its extras start; one more than there are bands.
+    extra_starts: Vec<usize>,
+}
+
+impl Level {
+    fn new(width: usize, height: usize, texels: Vec<Option<Texel>>, extras: Vec<(u32, Texel)>) -> Self {
+        let bands = height.div_ceil(BAND);
+        let extra_starts = (0..=bands)
+            .map(|band| extras.partition_point(|&(pixel, _)| (pixel as usize) < band * BAND * width))
+            .collect();
+        Self {
+            width,
+            height,
+            irradiance: Columns::zero(texels.len()),
+            columns: TexelColumns::new(&texels),
+            texels,
+            extra_irradiance: vec![Vec3::ZERO; extras.len()],
+            extras,
+            extra_starts,
+        }
+    }
+
+    fn finest(buffer: &GBuffer) -> Self {
+        Self::new(
+            buffer.width() as usize,
+            buffer.height() as usize,
+            buffer.texels.clone(),
+            buffer.extras.clone(),
+        )
+    }
+
+    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle.
+    fn coarser(&self) -> Self {
+        let stride = STRIDE as usize;
+        let (width, height) = (self.width.div_ceil(stride), self.height.div_ceil(stride));
+        let texels = (0..width * height)
+            .map(|index| {
+                let (x0, y0) = (index % width * stride, index / width * stride);
+                let middle = (stride as f32 - 1.0) * 0.5;
+                let inside = (0..stride * stride).filter_map(|it| {
+                    let (dx, dy) = (it % stride, it / stride);
+                    let (x, y) = (x0 + dx, y0 + dy);
+                    let texel = (x < self.width && y < self.height)
+                        .then(|| self.texels[y * self.width + x])
+                        .flatten()?;
+                    let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
+                    Some((off, texel))
+                });
+                inside.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, texel)| texel)
+            })
+            .collect();
+        Self::new(width, height, texels, Vec::new())
+    }
+
+    /// Adds the splats of this level and returns the flux that they deposited.
+    fn accumulate(&mut self, prepared: &[Prepared], level: usize) -> DVec3 {
+        let bands = self.height.div_ceil(BAND);
+        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
+        for (index, item) in prepared.iter().enumerate() {
+            if let Prepared::Splat(splat) = item
+                && usize::from(splat.level) == level
+                && splat.rows[0] < splat.rows[1]
+            {
+                let first = usize::from(splat.rows[0]) / BAND;
+                let last = usize::from(splat.rows[1] - 1) / BAND;
+                for list in &mut lists[first..=last] {
+                    list.push(index as u32);
+                }
+            }
+        }
+        let mut extra_rest = self.extra_irradiance.as_mut_slice();
+        let mut tasks = Vec::with_capacity(bands);
+        for (number, irradiance) in self.irradiance.chunks_mut(BAND * self.width).enumerate() {
+            let extras = self.extra_starts[number]..self.extra_starts[number + 1];
+            let (extra_irradiance, rest) = extra_rest.split_at_mut(extras.len());
+            extra_rest = rest;
+            tasks.push(BandTask {
+                first_row: number * BAND,
+                width: self.width,
+                columns: &self.columns,
+                irradiance,
+                extras: &self.extras[extras],
+                extra_irradiance,
+                splats: &lists[number],
+            });
+        }
+        #[cfg(feature = "parallel")]
+        let deposited: Vec<DVec3> = {
+            use rayon::prelude::*;
+            tasks.into_par_iter().with_max_len(1).map(|task| task.run(prepared)).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let deposited: Vec<DVec3> = tasks.into_iter().map(|task| task.run(prepared)).collect();
+        deposited.into_iter().sum()
+    }
+
+    fn add_coarser(&mut self, coarse: &Self) {
+        let stride = STRIDE as f32;
+        let width = self.width;
+        let place = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            (Vec2::new(x as f32, y as f32) + 0.5) / stride - 0.5
+        };
+        if coarse.is_dark() {
+            return;
+        }
+        for (pixel, texel) in self.texels.iter().enumerate() {
+            if let Some(texel) = texel {
+                let sum = self.irradiance.get(pixel) + coarse.interpolate(place(pixel), texel);
+                self.irradiance.set(pixel, sum);
+            }
+        }
+        for ((pixel, texel), irradiance) in self.extras.iter().zip(&mut self.extra_irradiance) {
+            *irradiance += coarse.interpolate(place(*pixel as usize), texel);
+        }
+    }
+
+    fn is_dark(&self) -> bool {
+        self.irradiance.x.iter().chain(&self.irradiance.y).chain(&self.irradiance.z).all(|&it| it == 0.0)
+    }
+
+    /// The irradiance between the middles of pixels, from those that see the same surface.
+    fn interpolate(&self, at: Vec2, texel: &Texel) -> Vec3 {
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        // The four around the point; where none sees the surface, the next ones out.
+        for (first, last) in [(0, 1), (-1, 2)] {
+            let base = at.floor();
+            for dy in first..=last {
+                for dx in first..=last {
+                    let corner = base + Vec2::new(dx as f32, dy as f32);
+                    let (x, y) = (corner.x as isize, corner.y as isize);
+                    if x < 0 || y < 0 || x >= self.width as isize || y >= self.height as isize {
+                        continue;
+                    }
+                    let index = y as usize * self.width + x as usize;
+                    let Some(other) = &self.texels[index] else { continue };
+                    if !texel.is_like(other) {
+                        continue;
+                    }
+                    let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
+                    let weight = tent.x * tent.y;
+                    sum += weight * self.irradiance.get(index);
+                    weights += weight;
+                }
+            }
+            if weights > 0.0 {
+                return sum / weights;
+            }
+        }
+        Vec3::ZERO
+    }
+
+    fn radiance(&self) -> Result<Image, RenderError> {
+        let mut image = Image::new(self.width as u32, self.height as u32)?;
+        let pixels = image.pixels_mut();
+        for (index, texel) in self.texels.iter().enumerate() {
+            if let Some(texel) = texel {
+                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance.get(index)).to_array();
+            }
+        }
+        for ((pixel, texel), irradiance) in self.extras.iter().zip(&self.extra_irradiance) {
+            let pixel = &mut pixels[*pixel as usize];
+            *pixel = (Vec3::from(*pixel) + FRAC_1_PI * texel.albedo * *irradiance).to_array();
+        }
+        Ok(image)
+    }
+}
+
+/// A band of rows and the splats that overlap it.
+struct BandTask<'a> {
+    first_row: usize,
+    width: usize,
+    columns: &'a TexelColumns,
+    /// From the band's first row on.
+    irradiance: ColumnsMut<'a>,
+    extras: &'a [(u32, Texel)],
+    extra_irradiance: &'a mut [Vec3],
+    splats: &'a [u32],
+}
+
+impl BandTask<'_> {
+    fn run(mut self, prepared: &[Prepared]) -> DVec3 {
+        let rows = self.irradiance.x.len() / self.width;
+        let deposited = DVec3::ZERO;
+        for &index in self.splats {
+            let Prepared::Splat(splat) = &prepared[index as usize] else { continue };
+            let first = usize::from(splat.rows[0]).max(self.first_row);
+            let last = usize::from(splat.rows[1]).min(self.first_row + rows);
+            for row in first..last {
+                let span = splat.span(row);
+                let start = (row - self.first_row) * self.width;
+                self.columns.light(
+                    &splat.density,
+                    &splat.gate,
+                    row * self.width + span.start,
+                    span.len(),
+                    &mut self.irradiance,
+                    start + span.start,
+                );
+            }
+            if !self.extras.is_empty() && first < last {
+                let low = (first * self.width) as u32;
+                let high = (last * self.width) as u32;
+                let begin = self.extras.partition_point(|&(pixel, _)| pixel < low);
+                let columns = splat.columns.map(u32::from);
+                for (offset, (pixel, texel)) in self.extras[begin..].iter().enumerate() {
+                    if *pixel >= high {
+                        break;
+                    }
+                    let column = pixel % self.width as u32;
+                    if (columns[0]..columns[1]).contains(&column) {
+                        self.extra_irradiance[begin + offset] += splat.irradiance(texel);
+                    }
+                }
+            }
+        }
+        deposited
+    }
+}

@@ -1,0 +1,151 @@
+use caustics_geometry::Sphere;
+use caustics_sampling::warp::Cone;
+use caustics_scene::World;
+use glam::{Vec2, Vec3};
+
+/// Vertices that the shape of an aimed domain is found from; its size is found from all.
+const SHAPE_VERTICES: usize = 4096;
+
+/// Steps towards the smallest cone.
+const CONE_STEPS: u32 = 24;
+
+/// Orientations of a rectangle that are tried over a quarter turn.
+const ORIENTATIONS: u16 = 32;
+
+/// The widest cone that is aimed, as its cosine. Beyond a hemisphere a cone about a triangle's
+/// corners need not hold the triangle.
+const MIN_CONE_COSINE: f32 = 0.05;
+
+/// By how much an aimed domain is wider than what it holds, so that rounding cuts nothing off.
+const MARGIN: f32 = 1e-4;
+
+/// The specular objects of a world, as what bounds them: vertices and spheres.
+#[derive(Clone, Debug)]
+pub(crate) struct Casters {
+    vertices: Vec<Vec3>,
+    spheres: Vec<Sphere>,
+    bounding: Sphere,
+}
+
+impl Casters {
+    /// `None` where nothing is specular.
+    pub(crate) fn of(world: &World) -> Option<Self> {
+        let mut vertices = Vec::new();
+        let mut spheres = Vec::new();
+        let mut is_used = vec![false; world.positions().len()];
+        for object in world.objects() {
+            if !world.materials()[object.material as usize].surface.is_specular() {
+                continue;
+            }
+            let triangles = object.triangles.start as usize..object.triangles.end as usize;
+            for &vertex in world.triangles()[triangles].as_flattened() {
+                if !std::mem::replace(&mut is_used[vertex as usize], true) {
+                    vertices.push(world.positions()[vertex as usize]);
+                }
+            }
+            let range = object.spheres.start as usize..object.spheres.end as usize;
+            spheres.extend_from_slice(&world.spheres()[range]);
+        }
+        if vertices.is_empty() && spheres.is_empty() {
+            return None;
+        }
+        let center = world.specular_bounds().center();
+        let reach = |point: &Vec3| point.distance(center);
+        let farthest = vertices.iter().map(reach).fold(0.0, f32::max);
+        let radius = spheres.iter().map(|it| reach(&it.center) + it.radius).fold(farthest, f32::max);
+        let bounding = Sphere { center, radius: radius * (1.0 + MARGIN) };
+        Some(Self { vertices, spheres, bounding })
+    }
+
+    /// A sphere that holds everything.
+    pub(crate) fn bounding(&self) -> &Sphere {
+        &self.bounding
+    }
+
+    /// A narrow cone of directions from `origin`, with its axis, that holds everything; `None`
+    /// where there is none below a hemisphere.
+    pub(crate) fn cone_from(&self, origin: Vec3) -> Option<(Vec3, Cone)> {
+        let mut axis = (self.bounding.center - origin).try_normalize()?;
+        // Bădoiu and Clarkson's smallest enclosing ball, on the sphere of directions.
+        for step in 0..CONE_STEPS {
+            let farthest = self
+                .sampled()
+                .filter_map(|vertex| (vertex - origin).try_normalize())
+                .min_by(|a, b| a.dot(axis).total_cmp(&b.dot(axis)));
+            let Some(farthest) = farthest else { break };
+            axis = (axis + (farthest - axis) / (step + 2) as f32).try_normalize()?;
+        }
+        let mut angle = 0.0f32;
+        for vertex in &self.vertices {
+            angle = angle.max((vertex - origin).try_normalize()?.angle_between(axis));
+        }
+        for sphere in &self.spheres {
+            let to_center = sphere.center - origin;
+            let distance = to_center.length();
+            if distance <= sphere.radius {
+                return None;
+            }
+            let around = (sphere.radius / distance).asin();
+            angle = angle.max(to_center.angle_between(axis) + around);
+        }
+        let angle = angle * (1.0 + MARGIN) + MARGIN * MARGIN;
+        (angle.cos() > MIN_CONE_COSINE)
+            .then(|| Cone::from_half_angle(angle).ok())
+            .flatten()
+            .map(|cone| (axis, cone))
+    }
+
+    /// The rectangle across `direction` that holds everything seen along it: a corner and two
+    /// perpendicular edges.
+    pub(crate) fn rectangle_across(&self, direction: Vec3) -> (Vec3, [Vec3; 2]) {
+        let (tangent, bitangent) = direction.any_orthonormal_pair();
+        let flat = |point: Vec3| Vec2::new(point.dot(tangent), point.dot(bitangent));
+        let area = |turn: f32| {
+            let (low, high) = extent(self.sampled().map(flat), turn);
+            (high - low).element_product()
+        };
+        let turn = (0..ORIENTATIONS)
+            .map(|step| f32::from(step) / f32::from(ORIENTATIONS) * std::f32::consts::FRAC_PI_2)
+            .min_by(|&a, &b| area(a).total_cmp(&area(b)))
+            .unwrap_or(0.0);
+        let (mut low, mut high) = extent(self.vertices.iter().copied().map(flat), turn);
+        let axes = Vec2::from_angle(turn);
+        let back = |point: Vec2| {
+            let turned = axes.rotate(point);
+            turned.x * tangent + turned.y * bitangent
+        };
+        for sphere in &self.spheres {
+            let center = turned_back(axes, flat(sphere.center));
+            low = low.min(center - sphere.radius);
+            high = high.max(center + sphere.radius);
+        }
+        let margin = MARGIN * (high - low).max_element();
+        let (low, size) = (low - margin, high - low + 2.0 * margin);
+        (back(low), [back(Vec2::X) * size.x, back(Vec2::Y) * size.y])
+    }
+
+    /// Some of the vertices, and the outermost points of the spheres.
+    fn sampled(&self) -> impl Iterator<Item = Vec3> {
+        let stride = self.vertices.len().div_ceil(SHAPE_VERTICES).max(1);
+        let poles = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+        let around = self
+            .spheres
+            .iter()
+            .flat_map(move |sphere| poles.map(|pole| sphere.center + sphere.radius * pole));
+        self.vertices.iter().step_by(stride).copied().chain(around)
+    }
+}
+
+/// The box around points in a frame turned by `turn` radians.
+fn extent(points: impl Iterator<Item = Vec2>, turn: f32) -> (Vec2, Vec2) {
+    let axes = Vec2::from_angle(turn);
+    points.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), point| {
+        let turned = turned_back(axes, point);
+        (low.min(turned), high.max(turned))
+    })
+}
+
+/// A point rotated by the opposite of the angle of the unit vector `axes`.
+fn turned_back(axes: Vec2, point: Vec2) -> Vec2 {
+    Vec2::new(axes.x, -axes.y).rotate(point)
+}
