@@ -31,6 +31,7 @@ usage: render [options] [scene.glb | scene.gltf]
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
                                                                     (split-all)
+  --refine LEVELS           divide cells of the lattice at edges, so often (0)
   --aim NAME                where lights aim: casters, everywhere   (casters)
   --out FILE.png            the picture                             (caustics.png)
   --caustics-only FILE.exr  the caustics alone, linear radiance
@@ -142,6 +143,7 @@ impl Arguments {
                     ],
                 )?;
             }
+            "refine" => trace.refinement.levels = number(name, parser)?,
             "aim" => {
                 trace.aim = choice(
                     name,
