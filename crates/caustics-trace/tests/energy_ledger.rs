@@ -60,7 +60,9 @@ fn add_lamp(scene: &mut Scene, lamp: &Lamp, colour: [f32; 3]) {
             return;
         }
     };
-    scene.add_light(light.expect("a valid light")).expect("a valid light");
+    scene
+        .add_light(light.expect("a valid light"))
+        .expect("a valid light");
 }
 
 proptest! {
@@ -142,10 +144,18 @@ proptest! {
 fn a_missing_entry_shows() {
     let mut scene = Scene::new();
     add_floor(&mut scene, -2.0, 4.0);
-    add_sphere(&mut scene, Vec3::ZERO, 0.5, Material::dielectric("glass", 1.5));
+    add_sphere(
+        &mut scene,
+        Vec3::ZERO,
+        0.5,
+        Material::dielectric("glass", 1.5),
+    );
     add_lamp(&mut scene, &Lamp::Point, [1.0; 3]);
     let (world, intersector) = flattened(&scene);
-    let options = TraceOptions { photons: 1000, ..TraceOptions::default() };
+    let options = TraceOptions {
+        photons: 1000,
+        ..TraceOptions::default()
+    };
     let map = trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options");
     assert!(map.ledger.imbalance() < 1e-6);
     let mut ledger = map.ledger.clone();
