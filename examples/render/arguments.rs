@@ -18,7 +18,7 @@ usage: render [options] [scene.glb | scene.gltf]
   --samples N               eye rays a pixel                        (4)
   --seed N                  chooses the random numbers              (0)
   --camera N                which camera of the file                (0)
-  --estimate NAME           how photons become light                (nearest)
+  --estimate NAME           how photons become light                (grid-gaussian)
   --list-estimates          name all estimates
   --visibility direct|full  caustics only where the camera sees the receiver itself,
                             or also through glass and in mirrors    (full)
@@ -30,7 +30,7 @@ usage: render [options] [scene.glb | scene.gltf]
   --kernel NAME             their weight by distance: box, cone, epanechnikov, gaussian,
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
-                                                                    (roulette)
+                                                                    (split-all)
   --aim NAME                where lights aim: casters, everywhere   (casters)
   --out FILE.png            the picture                             (caustics.png)
   --caustics-only FILE.exr  the caustics alone, linear radiance
@@ -121,8 +121,11 @@ impl Arguments {
             "neighbours" => self.caustics.nearest.count = number(name, parser)?,
             "radius" => self.caustics.nearest.max_radius = Some(finite(name, parser)?),
             "estimate" => {
-                self.caustics.estimate =
-                    choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
+                let estimate = choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
+                let preset = CausticsOptions::for_estimate(estimate);
+                self.caustics.estimate = estimate;
+                self.caustics.trace.sequence = preset.trace.sequence;
+                self.caustics.footprint.kernel = preset.footprint.kernel;
             }
             "kernel" => {
                 let kernels = Kernel::ALL.map(|it| (it.name(), it));

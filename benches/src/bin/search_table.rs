@@ -88,7 +88,8 @@ fn main() {
         ImmutableKdTree::new_from_slice(&rows).expect("valid")
     });
     let flat: Vec<f32> = rows.iter().flatten().copied().collect();
-    let dataset = MatrixDataset::new(flat, rows.len(), 3, MatrixLayout::RowMajorPoints).expect("valid");
+    let dataset =
+        MatrixDataset::new(flat, rows.len(), 3, MatrixLayout::RowMajorPoints).expect("valid");
     let nanoflann = timed("nanoflann", || {
         KdTree::new(3, &dataset, L2Simple, KdTreeParams::default()).expect("valid")
     });

@@ -1,5 +1,6 @@
 //! Triangle and photon acceleration structures.
 
+mod box_tree;
 mod error;
 mod hash_grid;
 mod intersect;
@@ -9,6 +10,7 @@ mod photon_tree;
 mod simd;
 mod triangle_bvh;
 
+pub use box_tree::BoxTree;
 pub use error::AccelError;
 pub use hash_grid::HashGrid;
 pub use intersect::Intersect;

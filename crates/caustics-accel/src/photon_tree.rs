@@ -36,14 +36,14 @@ pub struct PhotonTree {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Bucket {
-    /// By axis, then by half of the bucket. Unused places are infinite.
+    /// By axis, then by half of the bucket. Unused places are NaN, at no distance.
     positions: [[Row; 2]; 3],
     indices: [u32; BUCKET],
 }
 
 impl Bucket {
     const EMPTY: Self = Self {
-        positions: [[[f32::INFINITY; WIDTH]; 2]; 3],
+        positions: [[[f32::NAN; WIDTH]; 2]; 3],
         indices: [u32::MAX; BUCKET],
     };
 }
@@ -101,7 +101,7 @@ fn left_buckets(buckets: usize) -> usize {
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     subtree: Subtree,
-    /// From the query point to the subtree's half-spaces, by axis.
+    /// Squared distances from the query point to the subtree's half-spaces, by axis.
     offset: [f32; 3],
     distance_squared: f32,
 }
@@ -210,6 +210,7 @@ impl PhotonTree {
                 collector: Nearest {
                     keys: &mut scratch.keys,
                     count,
+                    capacity: count,
                     accept,
                 },
             });
@@ -377,6 +378,8 @@ impl<V: FnMut(u32, f32)> Collector for Within<V> {
 struct Nearest<'a, A> {
     keys: &'a mut Vec<u64>,
     count: usize,
+    /// How many keys call for thinning out: the first time as many as are wanted, for a bound.
+    capacity: usize,
     accept: A,
 }
 
@@ -387,10 +390,11 @@ impl<A: FnMut(u32) -> bool> Collector for Nearest<'_, A> {
             return bound;
         }
         self.keys.push(key(distance_squared, index));
-        if self.keys.len() < self.count.saturating_mul(2) {
+        if self.keys.len() < self.capacity {
             return bound;
         }
         keep_nearest(self.keys, self.count);
+        self.capacity = self.count.saturating_mul(2);
         distance_squared_of(self.keys[self.count - 1])
     }
 }
@@ -418,7 +422,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
 
     #[inline(always)]
     fn run<L: Lanes>(mut self, lanes: L) {
-        let query = self.point.to_array();
+        let query = self.point.extend(0.0).to_array();
         let rows = [
             lanes.splat(query[0]),
             lanes.splat(query[1]),
@@ -451,7 +455,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
             } = waiting;
             while subtree.buckets > 1 {
                 let split = self.tree.splits[subtree.split as usize];
-                let axis = split.axis as usize % 3;
+                let axis = split.axis as usize & 3;
                 let (left, right) = subtree.children();
                 let to_left = query[axis] - split.left;
                 let to_right = split.right - query[axis];
@@ -461,15 +465,17 @@ impl<C: Collector> Kernel for Search<'_, C> {
                 } else {
                     (right, left, to_left)
                 };
-                let before = offset[axis];
-                let mut far_offset = offset;
-                far_offset[axis] = to_far.max(before);
-                let [x, y, z] = far_offset;
-                let far_distance = x * x + y * y + z * z;
+                // Selected, not stored by index: the sum would wait for the store.
+                let squared = to_far * to_far;
+                let [x, y, z] = offset;
+                let x = if axis == 0 { squared.max(x) } else { x };
+                let y = if axis == 1 { squared.max(y) } else { y };
+                let z = if axis == 2 { squared.max(z) } else { z };
+                let far_distance = x + y + z;
                 if far_distance <= bound {
                     stack.push(Waiting {
                         subtree: far,
-                        offset: far_offset,
+                        offset: [x, y, z],
                         distance_squared: far_distance,
                     });
                 }
@@ -493,7 +499,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
                     let lane = near.trailing_zeros() as usize & 7;
                     near &= near - 1;
                     let index = bucket.indices[half * WIDTH + lane];
-                    if distances[lane] <= bound && index != u32::MAX {
+                    if distances[lane] <= bound {
                         bound = self.collector.take(index, distances[lane], bound);
                     }
                 }

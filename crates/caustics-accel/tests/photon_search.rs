@@ -123,7 +123,7 @@ proptest! {
         } else {
             let low = positions.iter().copied().reduce(Vec3::min).unwrap();
             let high = positions.iter().copied().reduce(Vec3::max).unwrap();
-            (positions[choice.index(positions.len())], (high - low).max_element() / 16.0)
+            (positions[choice.index(positions.len())], ((high - low).max_element() / 16.0).max(1e-6))
         };
         let off = centre + Vec3::from_array(offset) * scale;
         let queries = [(off, count, radius * scale), (centre, count, radius * scale),

@@ -1,6 +1,6 @@
 use glam::Vec3;
 
-use crate::footprint::{Density, FootprintKernel};
+use crate::footprint::{Density, FootprintKernel, Gate};
 use crate::gbuffer::Texel;
 
 /// Points in space or directions, each coordinate in a list of its own, so that loops over many
@@ -130,31 +130,5 @@ impl TexelColumns {
             green[i] += strength.y * weight;
             blue[i] += strength.z * weight;
         }
-    }
-}
-
-/// Which points a footprint may light.
-///
-/// What stands before the footprint's plane, as a wall does that its receiver ends at, catches the
-/// light on its way to the plane. What lies beyond the plane is lit only if it is the receiver
-/// itself, curving away: not what is to be seen past its edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Gate {
-    /// How far before the footprint's plane, in metres.
-    pub(crate) reach: f32,
-    /// How far beyond the footprint's plane, in metres.
-    pub(crate) plane_distance: f32,
-    /// The least cosine between the normals beyond the plane.
-    pub(crate) normal_cosine: f32,
-}
-
-impl Gate {
-    /// Whether a point with a normal passes.
-    pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
-        let off = (point - density.center).dot(density.normal);
-        let is_before = off >= 0.0 && off <= self.reach;
-        let is_beyond = off >= -self.plane_distance
-            && normal.dot(density.normal) >= self.normal_cosine;
-        is_before || (is_beyond && off < 0.0)
     }
 }

@@ -40,6 +40,12 @@ pub enum RenderError {
         /// The limit.
         max_anisotropy: f32,
     },
+    /// A photon with a NaN or infinite number in it.
+    #[error("photon {photon} is not finite")]
+    NonFinitePhoton {
+        /// Index of the first such photon.
+        photon: usize,
+    },
     /// A structure that photons are found with could not be built.
     #[error(transparent)]
     Accel(#[from] AccelError),

@@ -1,5 +1,6 @@
-use std::f32::consts::PI;
+use std::f32::consts::{PI, SQRT_2};
 
+use caustics_geometry::Aabb;
 use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 
@@ -11,6 +12,17 @@ const GAUSSIAN_CUT: f32 = 9.0;
 /// The least cosine between a photon's direction and its receiver at which other points of the
 /// receiver are still followed along that direction; below it they are followed along the normal.
 const MIN_INCIDENCE: f32 = 0.05;
+
+/// The least cosine between the normals of a footprint and of a point that it may light.
+const MIN_NORMAL_COSINE: f32 = 0.5;
+
+/// How far off its plane a footprint lights, relative to its radius.
+const PLANE_DISTANCE: f32 = 0.3;
+
+/// How far along its light a point is followed to the footprint's plane, relative to the distance
+/// allowed off that plane: at grazing incidence, points that the light passes far above are not
+/// the footprint's.
+const MAX_SLIDE: f32 = 2.0;
 
 /// The shape in which a footprint spreads its flux.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -57,7 +69,7 @@ impl FootprintKernel {
     ///
     /// For the Gaussian it is that of the box as wide as the pixel. The others end sooner, and need
     /// more to reach a pixel's middle from wherever they stand.
-    fn pixel_variance(self) -> f32 {
+    pub(crate) fn pixel_variance(self) -> f32 {
         if self == Self::Gaussian { 1.0 / 12.0 } else { 0.25 }
     }
 
@@ -69,6 +81,19 @@ impl FootprintKernel {
             Self::Ellipse | Self::Tent => 6.0f32.sqrt(),
             Self::Disc => 2.0,
         }
+    }
+
+    /// How far a blur of one standard deviation carries light from where it would be, in any
+    /// direction, along the receiver or off its plane.
+    pub(crate) fn search_reach(self) -> f32 {
+        self.outer_reach() + self.reach() * MAX_SLIDE
+    }
+
+    /// The farthest that light gets along any direction, in standard deviations along that
+    /// direction.
+    fn outer_reach(self) -> f32 {
+        // The tent's corners lie beyond the ellipse.
+        if self == Self::Tent { SQRT_2 * self.reach() } else { self.reach() }
     }
 
     /// The kernel at coordinates along its axes in standard deviations; its integral is 1.
@@ -177,43 +202,104 @@ impl Density {
         pixel: Option<[Vec3; 2]>,
         options: &FootprintOptions,
     ) -> Option<Self> {
-        let normal = photon.normal;
+        let mut covariance = Covariance::of_axes(&photon.axes, photon.normal, options);
+        if let Some(pixel) = pixel {
+            covariance.add_pixel(&pixel, photon.normal, options.kernel);
+        }
+        Self::spread(&Beam::of(photon), &covariance, options.kernel)
+    }
+
+    /// The density of a photon without a pixel, with its standard deviations kept within bounds, and
+    /// what was done to that end; `None` only if the numbers overflow.
+    pub(crate) fn within(
+        photon: &Photon,
+        bounds: &ExtentBounds,
+        options: &FootprintOptions,
+    ) -> Option<(Self, Adjustment)> {
+        let longest = bounds.most / options.scale;
+        let mut shortened = false;
+        let axes = photon.axes.map(|axis| {
+            // Before its square overflows.
+            let largest = axis.abs().max_element();
+            let is_long = largest > longest;
+            shortened |= is_long;
+            if is_long { axis / largest * longest } else { axis }
+        });
+        let mut covariance = Covariance::of_axes(&axes, photon.normal, options);
+        let widened = covariance.widen(bounds.least * bounds.least);
+        let density = Self::spread(&Beam::of(photon), &covariance, options.kernel)?;
+        Some((density, Adjustment { widened, shortened }))
+    }
+
+    /// This density blurred by a pixel whose edges on the receiver are `pixel`.
+    pub(crate) fn blurred(&self, pixel: &[Vec3; 2]) -> Option<Self> {
+        let (tangent, bitangent) = self.normal.any_orthonormal_pair();
+        let [[xx, _], [xy, yy]] =
+            [[self.axes[0].dot(tangent), 0.0], self.axes.map(|axis| axis.dot(bitangent))];
+        let mut covariance = Covariance { xx: xx * xx, xy: xx * xy, yy: xy * xy + yy * yy };
+        covariance.add_pixel(pixel, self.normal, self.kernel);
+        let cosine = (-self.incoming.dot(self.normal)).max(MIN_INCIDENCE);
+        let beam = Beam {
+            center: self.center,
+            normal: self.normal,
+            incoming: self.incoming,
+            flux: self.strength * (xx * yy * cosine),
+        };
+        Self::spread(&beam, &covariance, self.kernel)
+    }
+
+    fn spread(beam: &Beam, covariance: &Covariance, kernel: FootprintKernel) -> Option<Self> {
+        let Beam { center, normal, incoming, flux } = *beam;
         let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let mut covariance = Covariance::default();
-        let squared = options.scale * options.scale;
-        for axis in &photon.axes {
-            covariance.add(squared, axis.dot(tangent), axis.dot(bitangent));
-        }
-        covariance.limit_anisotropy(options.max_anisotropy);
-        if options.kernel == FootprintKernel::Disc {
-            covariance = covariance.rounded();
-        }
-        for axis in pixel.iter().flatten() {
-            covariance.add(options.kernel.pixel_variance(), axis.dot(tangent), axis.dot(bitangent));
-        }
         let [[xx, _], [xy, yy]] = covariance.cholesky()?;
         let area = xx * yy;
         let mut u_gradient = tangent / xx;
         let mut v_gradient = (bitangent - (xy / xx) * tangent) / yy;
-        let incidence = photon.incoming.dot(normal);
+        let incidence = incoming.dot(normal);
         if incidence < -MIN_INCIDENCE {
-            let slide = |gradient: Vec3| {
-                gradient - normal * (photon.incoming.dot(gradient) / incidence)
-            };
+            let slide =
+                |gradient: Vec3| gradient - normal * (incoming.dot(gradient) / incidence);
             (u_gradient, v_gradient) = (slide(u_gradient), slide(v_gradient));
         }
         let cosine = (-incidence).max(MIN_INCIDENCE);
         let density = Self {
-            center: photon.position,
+            center,
             normal,
-            incoming: photon.incoming,
+            incoming,
             u_gradient,
             v_gradient,
             axes: [xx * tangent + xy * bitangent, yy * bitangent],
-            strength: photon.flux / (area * cosine),
-            kernel: options.kernel,
+            strength: flux / (area * cosine),
+            kernel,
         };
         (area > 0.0 && density.strength.is_finite()).then_some(density)
+    }
+
+    /// Which points it may light.
+    pub(crate) fn gate(&self) -> Gate {
+        // Light that grazes the plane comes from far before it: what is followed along the light
+        // is limited, too.
+        let cosine = -self.incoming.dot(self.normal);
+        let reach = self.radius() * (MAX_SLIDE * cosine).clamp(MIN_INCIDENCE, 1.0);
+        Gate {
+            reach,
+            plane_distance: PLANE_DISTANCE * reach,
+            normal_cosine: MIN_NORMAL_COSINE,
+        }
+    }
+
+    /// A box that holds every point that it may light.
+    pub(crate) fn bounds(&self) -> Aabb {
+        let [a, b] = self.axes;
+        let deviation = Vec3::from_array(std::array::from_fn(|axis| a[axis].hypot(b[axis])));
+        let flat = self.kernel.outer_reach() * deviation;
+        let off = self.gate().reach;
+        let incidence = self.incoming.dot(self.normal);
+        let along =
+            if incidence < -MIN_INCIDENCE { self.incoming / incidence } else { self.normal };
+        let rounding = 4.0 * f32::EPSILON * self.center.abs();
+        let extent = flat + off * along.abs() + rounding;
+        Aabb { min: self.center - extent, max: self.center + extent }
     }
 
     /// Coordinates of a point, in standard deviations.
@@ -275,12 +361,71 @@ impl Density {
     }
 }
 
+/// Which points a footprint may light.
+///
+/// What stands before the footprint's plane, as a wall does that its receiver ends at, catches the
+/// light on its way to the plane. What lies beyond the plane is lit only if it is the receiver
+/// itself, curving away: not what is to be seen past its edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gate {
+    /// How far before the footprint's plane, in metres.
+    pub(crate) reach: f32,
+    /// How far beyond the footprint's plane, in metres.
+    pub(crate) plane_distance: f32,
+    /// The least cosine between the normals beyond the plane.
+    pub(crate) normal_cosine: f32,
+}
+
+impl Gate {
+    /// Whether a point with a normal passes.
+    pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
+        let off = (point - density.center).dot(density.normal);
+        let is_before = off >= 0.0 && off <= self.reach;
+        let is_beyond = off >= -self.plane_distance
+            && normal.dot(density.normal) >= self.normal_cosine;
+        is_before || (is_beyond && off < 0.0)
+    }
+}
+
 /// The parts of a [`Density`] that loops over many points keep at hand.
 pub(crate) struct Lighting<'a> {
     pub(crate) u_gradient: &'a Vec3,
     pub(crate) v_gradient: &'a Vec3,
     pub(crate) strength: &'a Vec3,
     pub(crate) kernel: FootprintKernel,
+}
+
+/// What a footprint spreads, and where.
+struct Beam {
+    center: Vec3,
+    normal: Vec3,
+    incoming: Vec3,
+    flux: Vec3,
+}
+
+impl Beam {
+    fn of(photon: &Photon) -> Self {
+        Self {
+            center: photon.position,
+            normal: photon.normal,
+            incoming: photon.incoming,
+            flux: photon.flux,
+        }
+    }
+}
+
+/// The standard deviations that a footprint without a pixel may have, in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ExtentBounds {
+    pub(crate) least: f32,
+    pub(crate) most: f32,
+}
+
+/// What was done to a footprint to keep it within bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Adjustment {
+    pub(crate) widened: bool,
+    pub(crate) shortened: bool,
 }
 
 /// A symmetric matrix of two dimensions.
@@ -292,6 +437,39 @@ struct Covariance {
 }
 
 impl Covariance {
+    /// The covariance of the kernel over a footprint with `axes`.
+    fn of_axes(axes: &[Vec3; 2], normal: Vec3, options: &FootprintOptions) -> Self {
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let mut covariance = Self::default();
+        let squared = options.scale * options.scale;
+        for axis in axes {
+            covariance.add(squared, axis.dot(tangent), axis.dot(bitangent));
+        }
+        covariance.limit_anisotropy(options.max_anisotropy);
+        if options.kernel == FootprintKernel::Disc {
+            covariance = covariance.rounded();
+        }
+        covariance
+    }
+
+    fn add_pixel(&mut self, pixel: &[Vec3; 2], normal: Vec3, kernel: FootprintKernel) {
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        for axis in pixel {
+            self.add(kernel.pixel_variance(), axis.dot(tangent), axis.dot(bitangent));
+        }
+    }
+
+    /// Adds to all directions what the shortest lacks to a variance of `least`; whether any.
+    fn widen(&mut self, least: f32) -> bool {
+        let (short, _) = self.eigenvalues();
+        let is_short = short < least;
+        if is_short {
+            self.xx += least - short;
+            self.yy += least - short;
+        }
+        is_short
+    }
+
     fn add(&mut self, weight: f32, x: f32, y: f32) {
         self.xx += weight * x * x;
         self.xy += weight * x * y;

@@ -2,14 +2,18 @@ use caustics_accel::{Intersect, NearestScratch};
 use caustics_filter::Image;
 use caustics_sampling::CounterRng;
 use caustics_scene::{Camera, World};
-use caustics_trace::MediumStack;
+use caustics_trace::{MediumStack, Photon};
 use glam::Vec3;
 
 use crate::direct::DirectLight;
 use crate::error::RenderError;
-use crate::eye::EyeTracer;
+use crate::eye::{EyeTracer, Receiver};
+use crate::footprint::FootprintOptions;
+use crate::footprint_gather::FootprintGather;
+use crate::gbuffer::GBuffer;
 use crate::nearest::NearestEstimate;
 use crate::pixel::PixelSamples;
+use crate::splat::splat;
 
 /// The largest width and height of a picture.
 const MAX_SIZE: u32 = 32_768;
@@ -75,6 +79,24 @@ impl PictureOptions {
     }
 }
 
+/// Where a picture's caustics come from.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum CausticSource<'a> {
+    /// There are none.
+    Dark,
+    /// The nearest photons of every receiver that an eye path reaches.
+    Nearest(&'a NearestEstimate<'a>),
+    /// Footprints: splatted where the camera sees the receiver itself, gathered where it sees it
+    /// through glass or in a mirror.
+    Footprints {
+        /// The photons.
+        photons: &'a [Photon],
+        /// How they are spread.
+        options: &'a FootprintOptions,
+    },
+}
+
 /// A picture in two parts, each linear radiance in W/(sr m²).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
@@ -98,7 +120,7 @@ impl Picture {
     }
 }
 
-/// Renders direct light and, where photons are given, their caustics.
+/// Renders direct light and caustics.
 ///
 /// `progress` is called with the number of rows that have just been finished, from any thread.
 ///
@@ -108,17 +130,35 @@ pub fn render<I: Intersect + ?Sized>(
     world: &World,
     intersect: &I,
     camera: &Camera,
-    estimate: Option<&NearestEstimate<'_>>,
+    source: CausticSource<'_>,
     options: &PictureOptions,
     progress: &(dyn Fn(u32) + Sync),
 ) -> Result<Picture, RenderError> {
     options.validate()?;
     let eye = camera.ray(0.5 * options.width as f32, 0.5 * options.height as f32, options.width, options.height);
+    // Footprints that the camera sees directly are splatted, not looked up pixel by pixel.
+    let (seen_directly, gather) = match source {
+        CausticSource::Footprints { photons, options: footprints } => {
+            let buffer = GBuffer::new(world, intersect, camera, options.width, options.height)?;
+            let (image, _) = splat(&buffer, photons, footprints)?;
+            let gather = match options.visibility {
+                Visibility::Direct => None,
+                Visibility::Full => Some(FootprintGather::new(photons, footprints)?),
+            };
+            (Some(image), gather)
+        }
+        _ => (None, None),
+    };
+    let lookup = match (source, &gather) {
+        (CausticSource::Nearest(estimate), _) => Lookup::Nearest(estimate),
+        (_, Some(gather)) => Lookup::Indirect(gather),
+        _ => Lookup::Nothing,
+    };
     let renderer = RowRenderer {
         world,
         intersect,
         camera,
-        estimate,
+        lookup,
         options,
         media: MediumStack::at(world, intersect, eye.origin),
     };
@@ -137,21 +177,35 @@ pub fn render<I: Intersect + ?Sized>(
 
     let mut picture = Picture {
         direct: Image::new(options.width, options.height)?,
-        caustics: Image::new(options.width, options.height)?,
+        caustics: match seen_directly {
+            Some(image) => image,
+            None => Image::new(options.width, options.height)?,
+        },
         rays: 0,
     };
     let targets = picture.direct.rows_mut().zip(picture.caustics.rows_mut());
     for (row, (direct, caustics)) in rows.into_iter().zip(targets) {
         direct.copy_from_slice(&row.direct);
-        caustics.copy_from_slice(&row.caustics);
+        for (pixel, looked_up) in caustics.iter_mut().zip(&row.caustics) {
+            *pixel = (Vec3::from(*pixel) + *looked_up).to_array();
+        }
         picture.rays += row.rays;
     }
     Ok(picture)
 }
 
+/// What a receiver on an eye path is asked for.
+#[derive(Clone, Copy)]
+enum Lookup<'a> {
+    Nothing,
+    Nearest(&'a NearestEstimate<'a>),
+    /// Only receivers that are not seen directly.
+    Indirect(&'a FootprintGather),
+}
+
 struct Row {
     direct: Vec<[f32; 3]>,
-    caustics: Vec<[f32; 3]>,
+    caustics: Vec<Vec3>,
     rays: u64,
 }
 
@@ -159,7 +213,7 @@ struct RowRenderer<'a, I: ?Sized> {
     world: &'a World,
     intersect: &'a I,
     camera: &'a Camera,
-    estimate: Option<&'a NearestEstimate<'a>>,
+    lookup: Lookup<'a>,
     options: &'a PictureOptions,
     media: MediumStack,
 }
@@ -184,19 +238,27 @@ impl<I: Intersect + ?Sized> RowRenderer<'_, I> {
                 );
                 let emitted = eye.trace(ray, self.media, &mut rng, |receiver, rng| {
                     direct += receiver.weight * direct_light.radiance(receiver, rng);
-                    let counts =
-                        receiver.seen_directly || options.visibility == Visibility::Full;
-                    if let Some(estimate) = self.estimate.filter(|_| counts) {
-                        caustics += receiver.weight * estimate.radiance(receiver, &mut scratch);
-                    }
+                    caustics += receiver.weight * self.caustic(receiver, &mut scratch);
                 });
                 direct += emitted;
             }
             let scale = 1.0 / options.samples as f32;
             row.direct.push((direct * scale).to_array());
-            row.caustics.push((caustics * scale).to_array());
+            row.caustics.push(caustics * scale);
         }
         row.rays = eye.rays;
         row
+    }
+
+    fn caustic(&self, receiver: &Receiver, scratch: &mut NearestScratch) -> Vec3 {
+        match self.lookup {
+            Lookup::Nearest(estimate)
+                if receiver.seen_directly || self.options.visibility == Visibility::Full =>
+            {
+                estimate.radiance(receiver, scratch)
+            }
+            Lookup::Indirect(gather) if !receiver.seen_directly => gather.radiance(receiver),
+            _ => Vec3::ZERO,
+        }
     }
 }

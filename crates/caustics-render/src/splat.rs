@@ -4,8 +4,8 @@ use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 
-use crate::columns::{Columns, ColumnsMut, Gate, TexelColumns};
-use crate::footprint::{Density, FootprintOptions};
+use crate::columns::{Columns, ColumnsMut, TexelColumns};
+use crate::footprint::{Density, FootprintOptions, Gate};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::error::RenderError;
 use crate::screen::Screen;
@@ -28,12 +28,6 @@ const LEVEL_SIGMA: f32 = 2.0;
 
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
-
-/// The least cosine between the normals of a footprint and of a texel that it may light.
-const MIN_NORMAL_COSINE: f32 = 0.5;
-
-/// How far off its plane a footprint lights a texel, relative to its radius.
-const PLANE_DISTANCE: f32 = 0.3;
 
 /// What became of the photons that were splatted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -155,11 +149,7 @@ impl Splat {
             density.scale_by(normalisation(&density, center, step_x, step_y));
         }
         let mut splat = Self {
-            gate: Gate {
-                reach: density.radius(),
-                plane_distance: PLANE_DISTANCE * density.radius(),
-                normal_cosine: MIN_NORMAL_COSINE,
-            },
+            gate: density.gate(),
             density,
             level: 0,
             is_local,

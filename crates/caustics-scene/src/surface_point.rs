@@ -51,7 +51,8 @@ impl World {
             } else {
                 let sphere = self.sphere(hit.primitive)?;
                 let spawn = SpawnPoint::on_sphere(sphere, ray.at(hit.t));
-                let normal = sphere.normal_at(ray.at(hit.t));
+                // Of the rounded point, as `normal_gradient` has it.
+                let normal = sphere.normal_at(spawn.position);
                 (spawn, normal, normal)
             };
         Some(SurfacePoint {

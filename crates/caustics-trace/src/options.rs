@@ -6,13 +6,14 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Branching {
     /// It goes one way, chosen with the Fresnel term as the probability, at its full flux.
-    #[default]
     Roulette,
     /// It goes both ways at the first such event, each with its part of the flux, and one way at
     /// every later one.
     SplitFirst,
     /// It goes both ways at every such event, each with its part of the flux, until a part falls
-    /// below [`TraceOptions::min_weight`].
+    /// below [`TraceOptions::min_weight`]. Each order of reflection is then a caustic of its own,
+    /// with as regular a set of photons as the light emits.
+    #[default]
     SplitAll,
 }
 
@@ -56,10 +57,10 @@ impl Default for TraceOptions {
             photons: 1_000_000,
             seed: 0,
             max_depth: 128,
-            branching: Branching::Roulette,
-            min_weight: 1e-3,
+            branching: Branching::SplitAll,
+            min_weight: 0.03,
             aim: Aim::Casters,
-            sequence: Sequence::Halton,
+            sequence: Sequence::Grid,
         }
     }
 }

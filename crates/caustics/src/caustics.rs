@@ -2,7 +2,8 @@ use std::time::Instant;
 
 use caustics_accel::BvhOptions;
 use caustics_render::{
-    Estimate, NearestEstimate, NearestOptions, Picture, PictureOptions, render,
+    CausticSource, Estimate, FootprintOptions, NearestEstimate, NearestOptions, Picture,
+    PictureOptions, render,
 };
 use caustics_scene::{Camera, Scene, SceneIntersector, World};
 use caustics_trace::{PhotonMap, TraceOptions, trace_photons};
@@ -10,7 +11,10 @@ use caustics_trace::{PhotonMap, TraceOptions, trace_photons};
 use crate::error::CausticsError;
 
 /// Everything that can be chosen about photons and how they become radiance.
-#[derive(Clone, Debug, Default, PartialEq)]
+///
+/// [`for_estimate`](Self::for_estimate) sets what belongs together; the default is that of the
+/// best estimate.
+#[derive(Clone, Debug, PartialEq)]
 pub struct CausticsOptions {
     /// How the acceleration structure is built.
     pub bvh: BvhOptions,
@@ -20,6 +24,33 @@ pub struct CausticsOptions {
     pub estimate: Estimate,
     /// The options of [`Estimate::Nearest`].
     pub nearest: NearestOptions,
+    /// The options of all other estimates.
+    pub footprint: FootprintOptions,
+}
+
+impl CausticsOptions {
+    /// The options that make `estimate` what its description says: where photons start, where they
+    /// split, and how they are spread.
+    #[must_use]
+    pub fn for_estimate(estimate: Estimate) -> Self {
+        let mut options = Self {
+            bvh: BvhOptions::default(),
+            trace: TraceOptions { sequence: estimate.sequence(), ..TraceOptions::default() },
+            estimate,
+            nearest: NearestOptions::default(),
+            footprint: FootprintOptions::default(),
+        };
+        if let Some(kernel) = estimate.kernel() {
+            options.footprint.kernel = kernel;
+        }
+        options
+    }
+}
+
+impl Default for CausticsOptions {
+    fn default() -> Self {
+        Self::for_estimate(Estimate::default())
+    }
 }
 
 /// A part of the work, as progress reports name it.
@@ -123,9 +154,16 @@ impl Caustics {
         options: &PictureOptions,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Picture, CausticsError> {
-        let estimate = NearestEstimate::new(&self.map.photons, &self.options.nearest)?;
+        let photons = &self.map.photons;
+        let nearest;
+        let source = if self.options.estimate == Estimate::Nearest {
+            nearest = NearestEstimate::new(photons, &self.options.nearest)?;
+            CausticSource::Nearest(&nearest)
+        } else {
+            CausticSource::Footprints { photons, options: &self.options.footprint }
+        };
         let total = u64::from(options.height);
-        Ok(render(&self.world, &self.intersector, camera, Some(&estimate), options, &|rows| {
+        Ok(render(&self.world, &self.intersector, camera, source, options, &|rows| {
             progress(Progress { stage: Stage::Render, finished: u64::from(rows), total });
         })?)
     }

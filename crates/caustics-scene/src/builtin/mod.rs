@@ -95,9 +95,9 @@ fn build() -> Result<Scene, Box<dyn std::error::Error>> {
     scene.add_camera(Camera::look_at(
         "camera",
         eye,
-        [0.045, 0.042, 0.01],
+        [0.060, 0.042, 0.014],
         Vec3::Y,
-        0.46,
+        0.41,
     )?)?;
     Ok(scene)
 }

@@ -207,10 +207,12 @@ impl<'a> AccessorReader<'a> {
         if span.count == 0 {
             return Ok(&[]);
         }
-        // In 128 bits nothing overflows.
-        let length = (span.count as u128 - 1) * span.stride as u128 + span.size as u128;
-        let end = u128::from(span.offset) + length;
-        if end > bytes.len() as u128 {
+        // What saturates is more than any view has.
+        let end = (span.count as u64 - 1)
+            .saturating_mul(span.stride as u64)
+            .saturating_add(span.size as u64)
+            .saturating_add(span.offset);
+        if end > bytes.len() as u64 {
             return Err(GltfError::OutOfBounds {
                 element: self.document.accessor_element(index),
                 needed: end,

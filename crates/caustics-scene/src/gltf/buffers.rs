@@ -83,7 +83,7 @@ impl<'a> Buffers<'a> {
             if buffer.byte_length.0 > available {
                 return Err(GltfError::OutOfBounds {
                     element: element(),
-                    needed: buffer.byte_length.0.into(),
+                    needed: buffer.byte_length.0,
                     container: "its data".to_owned(),
                     available,
                 });
@@ -124,7 +124,7 @@ impl<'a> Buffers<'a> {
         end.and_then(|end| self.data[buffer].bytes().get(start as usize..end as usize))
             .ok_or_else(|| GltfError::OutOfBounds {
                 element: element(),
-                needed: u128::from(start) + u128::from(view.byte_length.0),
+                needed: start.saturating_add(view.byte_length.0),
                 container: document.buffer_element(buffer).to_string(),
                 available: length,
             })

@@ -145,12 +145,12 @@ impl Document {
 }
 
 /// What a reference leads to, or the error that it leads nowhere.
-pub(crate) fn follow<'a, T>(
-    list: &'a [T],
+pub(crate) fn follow<T>(
+    list: &[T],
     index: usize,
     target: ElementKind,
     from: impl FnOnce() -> Element,
-) -> Result<&'a T, GltfError> {
+) -> Result<&T, GltfError> {
     list.get(index).ok_or_else(|| GltfError::Reference {
         element: from(),
         target,

@@ -57,7 +57,7 @@ pub struct Element {
     /// Its name in the file.
     pub name: Option<String>,
     /// The primitive of a mesh that is meant, from 0.
-    pub primitive: Option<usize>,
+    pub primitive: Option<u32>,
 }
 
 impl Element {
@@ -71,7 +71,7 @@ impl Element {
     }
 
     /// The same mesh, meaning one of its primitives.
-    pub(crate) fn with_primitive(mut self, primitive: usize) -> Self {
+    pub(crate) fn with_primitive(mut self, primitive: u32) -> Self {
         self.primitive = Some(primitive);
         self
     }

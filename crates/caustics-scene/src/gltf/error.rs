@@ -97,8 +97,8 @@ pub enum GltfError {
     OutOfBounds {
         /// The buffer, view, or accessor.
         element: Element,
-        /// How many bytes it needs.
-        needed: u128,
+        /// How many bytes it needs, or `u64::MAX` for more than that.
+        needed: u64,
         /// What contains it.
         container: String,
         /// How many bytes that has.

@@ -146,7 +146,7 @@ impl<'a> Loader<'a> {
                 .push(&element, WarningKind::Extension { name: name.clone() });
         }
         let mut parts = Vec::with_capacity(mesh.primitives.len());
-        for (number, primitive) in mesh.primitives.iter().enumerate() {
+        for (number, primitive) in (0..).zip(&mesh.primitives) {
             let element = element.clone().with_primitive(number);
             let scene = &mut self.scene;
             let add = |mesh| scene.add_mesh(mesh);
