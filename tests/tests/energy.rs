@@ -1,5 +1,6 @@
 //! Every watt is booked once, and the caustic is as bright however it is sampled.
 
+use caustics_sampling::Sequence;
 use caustics_tests::measure::trace;
 use caustics_tests::{TestError, gallery};
 use caustics_trace::glam::Vec3;
@@ -36,10 +37,10 @@ fn the_ledger_balances() -> Result<(), TestError> {
             let ledger = trace(&scene, &options)?.ledger;
             worst = worst.max(ledger.imbalance());
             assert!(
-                ledger.imbalance() < 1e-8,
+                ledger.imbalance() < 1e-9,
                 "{name} {branching:?} {aim:?}: {ledger:?}"
             );
-            assert!(ledger.entry(Fate::Stored).count > 100, "{name}: {ledger:?}");
+            assert!(ledger.entry(Fate::Stored).count > 20, "{name}: {ledger:?}");
             assert_eq!(ledger.entry(Fate::Invalid).count, 0, "{name}: {ledger:?}");
         }
         println!("{name}: imbalance {worst:.1e}");
@@ -54,7 +55,7 @@ fn a_ledger_that_does_not_balance_is_seen() -> Result<(), TestError> {
         ..TraceOptions::default()
     };
     let mut ledger = trace(&gallery::load("p03_cognac")?, &options)?.ledger;
-    assert!(ledger.imbalance() < 1e-8);
+    assert!(ledger.imbalance() < 1e-9);
     // A thousandth of what was emitted, booked a second time.
     let again = ledger.emitted().flux.as_vec3() * 1e-3;
     ledger.book(Fate::Stored, Vec3::new(0.0, again.y, 0.0));
@@ -95,14 +96,18 @@ fn the_caustic_is_as_bright_for_every_aim_and_branching() -> Result<(), TestErro
     for name in ["p03_cognac", "p05_brass_ring", "p10_torus_cube"] {
         let options = TraceOptions {
             photons: 1 << 16,
+            sequence: Sequence::Halton,
+            branching: Branching::SplitAll,
+            aim: Aim::Casters,
             ..TraceOptions::default()
         };
         let (flux, error) = stored(name, &options, 8)?;
         println!("{name}: {flux:.4} W +- {:.1e}", error / flux);
-        for (branching, aim) in ways() {
+        let rest = ways().filter(|&way| way != (options.branching, options.aim));
+        for (branching, aim) in rest {
             // Most photons that are aimed at nothing miss everything.
             let photons = if aim == Aim::Everywhere {
-                1 << 18
+                1 << 17
             } else {
                 1 << 16
             };
@@ -112,7 +117,7 @@ fn the_caustic_is_as_bright_for_every_aim_and_branching() -> Result<(), TestErro
                 aim,
                 ..options
             };
-            let (other, other_error) = stored(name, &options, 4)?;
+            let (other, other_error) = stored(name, &options, 8)?;
             let difference = (other - flux) / flux;
             let deviation = error.hypot(other_error) / flux;
             println!("{branching:?} {aim:?}: {difference:+.1e} +- {deviation:.1e}");
