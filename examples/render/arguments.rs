@@ -14,7 +14,7 @@ Renders the caustics of a glTF 2.0 file, or without one of the built-in cognac g
 usage: render [options] [scene.glb | scene.gltf]
 
   --width N, --height N     size of the picture in pixels           (1024 x 768)
-  --photons N               photons emitted, by all lights together (1000000)
+  --photons N               photons emitted, by all lights together (262144)
   --samples N               eye rays a pixel                        (4)
   --seed N                  chooses the random numbers              (0)
   --camera N                which camera of the file                (0)
@@ -39,7 +39,7 @@ usage: render [options] [scene.glb | scene.gltf]
   --help                    this text";
 
 /// What the user wants.
-pub enum Request {
+pub(crate) enum Request {
     /// Only this text.
     Print(String),
     /// A picture.
@@ -47,7 +47,7 @@ pub enum Request {
 }
 
 /// What to render and where to.
-pub struct Arguments {
+pub(crate) struct Arguments {
     pub scene: Option<PathBuf>,
     pub camera: usize,
     pub caustics: CausticsOptions,
@@ -78,7 +78,7 @@ impl Default for Arguments {
 }
 
 /// Reads the arguments that follow the program's name.
-pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request, String> {
+pub(crate) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request, String> {
     let mut parser = Parser::from_args(arguments);
     let mut result = Arguments::default();
     while let Some(argument) = parser.next().map_err(|error| error.to_string())? {

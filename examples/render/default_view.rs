@@ -4,7 +4,7 @@ use caustics::glam::Vec3;
 use caustics::prelude::*;
 
 /// Adds what the scene lacks to be seen, and says so.
-pub fn complete(scene: &mut Scene) -> Vec<String> {
+pub(crate) fn complete(scene: &mut Scene) -> Vec<String> {
     let mut notices = Vec::new();
     let Ok(world) = World::new(scene) else {
         // The caller meets the same error where it can report it.

@@ -11,7 +11,7 @@ use crate::arguments::Arguments;
 
 /// Wall-clock time of each stage, in seconds.
 #[derive(Clone, Copy)]
-pub struct Seconds {
+pub(crate) struct Seconds {
     pub load: f64,
     pub build: f64,
     pub trace: f64,
@@ -32,7 +32,7 @@ impl Seconds {
 }
 
 /// What there is to say when a picture is done.
-pub struct Report<'a> {
+pub(crate) struct Report<'a> {
     name: &'a str,
     arguments: &'a Arguments,
     caustics: &'a Caustics,
@@ -41,7 +41,7 @@ pub struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    pub fn new(
+    pub(crate) fn new(
         name: &'a str,
         arguments: &'a Arguments,
         caustics: &'a Caustics,
@@ -59,7 +59,7 @@ impl<'a> Report<'a> {
         self.picture.rays as f64 / self.seconds.render.max(1e-9)
     }
 
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         let ledger = &self.caustics.map().ledger;
         let entry = |entry: LedgerEntry| {
             json!({ "count": entry.count, "watts": entry.flux.to_array() })

@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 const PLAIN_STEP: u64 = 25;
 
 /// Shows how far the work is.
-pub struct Reporter {
+pub(crate) struct Reporter {
     current: Mutex<Option<Current>>,
     on_terminal: bool,
 }
@@ -23,11 +23,11 @@ struct Current {
 }
 
 impl Reporter {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { current: Mutex::new(None), on_terminal: std::io::stderr().is_terminal() }
     }
 
-    pub fn advance(&self, progress: Progress) {
+    pub(crate) fn advance(&self, progress: Progress) {
         // A poisoned lock means that another thread panicked: it is that panic which matters.
         let Ok(mut current) = self.current.lock() else { return };
         if current.as_ref().is_none_or(|it| it.stage != progress.stage) {
@@ -50,7 +50,7 @@ impl Reporter {
         }
     }
 
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Ok(mut current) = self.current.lock()
             && let Some(bar) = current.take().and_then(|it| it.bar)
         {

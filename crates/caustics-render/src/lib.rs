@@ -13,6 +13,7 @@ mod picture;
 mod pixel;
 mod screen;
 mod splat;
+mod thinning;
 
 pub use direct::DirectLight;
 pub use error::RenderError;

@@ -27,14 +27,17 @@ impl<const N: usize> RayDifferential<N> {
     /// `plane_normal`: each neighbour travels as far as it needs to reach the same plane
     /// (Igehy's equations 10 and 12).
     ///
-    /// A ray in the plane itself gives the displacement without the correction of the distance,
+    /// `distance` is in metres, `plane_normal` a unit vector to either side. The correction grows
+    /// without bound towards grazing incidence, as the true displacement does. A ray in the plane
+    /// itself, or so nearly that the correction overflows, gives the displacement without it,
     /// since no neighbour's distance exists.
     #[must_use]
     pub fn transferred(&self, direction: Vec3, distance: f32, plane_normal: Vec3) -> Self {
         let along = direction.dot(plane_normal);
         let position = std::array::from_fn(|i| {
             let moved = self.position[i] + distance * self.direction[i];
-            if along == 0.0 { moved } else { moved - moved.dot(plane_normal) / along * direction }
+            let corrected = moved - moved.dot(plane_normal) / along * direction;
+            if corrected.is_finite() { corrected } else { moved }
         });
         Self { position, direction: self.direction }
     }
@@ -80,19 +83,23 @@ impl<const N: usize> RayDifferential<N> {
         Self { position: self.position, direction: directions }
     }
 
-    /// The differential with the derivatives of the direction shortened to `limit`, and whether
-    /// any was longer or not finite.
+    /// The differential with the derivatives of the direction shortened to `limit` (a length, in
+    /// units of the parameter; not negative), and whether any was longer or not finite.
+    ///
+    /// A derivative that is not finite becomes zero, in the position too; a finite one of the
+    /// position is left alone.
     #[must_use]
     pub fn bounded(&self, limit: f32) -> (Self, bool) {
         let mut result = *self;
         let mut shortened = false;
         for change in &mut result.direction {
-            let length = change.length();
-            if !length.is_finite() {
+            if !change.is_finite() {
                 *change = Vec3::ZERO;
                 shortened = true;
-            } else if length > limit {
-                *change *= limit / length;
+            } else if change.length() > limit {
+                // Scaled first: the square of a large derivative, and so its length, overflows.
+                let scaled = *change / change.abs().max_element();
+                *change = scaled * (limit / scaled.length());
                 shortened = true;
             }
         }
@@ -114,17 +121,22 @@ impl<const N: usize> RayDifferential<N> {
         }
     }
 
-    /// Two axes in the plane with unit `normal` that stand for the displacements in all `N`
-    /// parameters: the displacements themselves where there are two, else two axes with the same
-    /// covariance `sum of p pᵀ`.
+    /// Two axes, in metres, in the plane with unit `normal` that stand for the displacements in all
+    /// `N` parameters: the displacements themselves where there are two, else two axes with the
+    /// same covariance `sum of p pᵀ`.
     #[must_use]
     pub fn footprint_axes(&self, normal: Vec3) -> [Vec3; 2] {
         if let [first, second] = self.position[..] {
             return [first, second];
         }
         let (tangent, bitangent) = normal.any_orthonormal_pair();
+        // Scaled by the largest: its square overflows long before it does.
+        let scale = self.position.iter().fold(0.0f32, |a, it| a.max(it.abs().max_element()));
+        if scale == 0.0 {
+            return [Vec3::ZERO; 2];
+        }
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for moved in &self.position {
+        for moved in self.position.map(|it| it / scale) {
             let (x, y) = (moved.dot(tangent), moved.dot(bitangent));
             xx += x * x;
             xy += x * y;
@@ -134,6 +146,68 @@ impl<const N: usize> RayDifferential<N> {
         let x = xx.sqrt();
         let shear = if x > 0.0 { xy / x } else { 0.0 };
         let y = (yy - shear * shear).max(0.0).sqrt();
-        [x * tangent + shear * bitangent, y * bitangent]
+        [scale * (x * tangent + shear * bitangent), scale * y * bitangent]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Straight down, its neighbours fanning out along x by 1 a unit, and shifted along z.
+    fn downwards() -> RayDifferential {
+        RayDifferential { position: [Vec3::ZERO, Vec3::Z], direction: [Vec3::X, Vec3::ZERO] }
+    }
+
+    #[test]
+    fn transfer_onto_a_slope_of_45_degrees() {
+        // From a point 2 above, the neighbour x = 2 h lands where 2 - y = x: lower by as much.
+        let normal = Vec3::new(1.0, 1.0, 0.0).normalize();
+        let landed = downwards().transferred(Vec3::NEG_Y, 2.0, normal);
+        assert!(landed.position[0].abs_diff_eq(Vec3::new(2.0, -2.0, 0.0), 1e-6));
+        assert_eq!(landed.position[1], Vec3::Z);
+        assert_eq!(landed.direction, downwards().direction);
+    }
+
+    #[test]
+    fn a_mirror_that_turns_by_one_turns_its_reflection_by_two() {
+        let bent = [Vec3::ZERO, Vec3::Z];
+        let reflected = downwards().reflected(Vec3::NEG_Y, Vec3::Y, bent);
+        assert_eq!(reflected.direction, [Vec3::X, 2.0 * Vec3::Z]);
+    }
+
+    #[test]
+    fn refraction_straight_through_scales_angles_by_the_ratio() {
+        // Small angles: sin t = eta sin i; a normal that turns by 1 turns the light by 1 - eta.
+        let bent = [Vec3::ZERO, Vec3::Z];
+        let refracted = downwards().refracted(Vec3::NEG_Y, Vec3::NEG_Y, Vec3::Y, 0.75, bent);
+        assert_eq!(refracted.direction, [0.75 * Vec3::X, -0.25 * Vec3::Z]);
+    }
+
+    #[test]
+    fn bounds_shorten_and_report() {
+        let long = RayDifferential {
+            position: [Vec3::NAN, 1e30 * Vec3::X],
+            direction: [3e30 * Vec3::new(1.0, 0.0, 1.0), Vec3::INFINITY],
+        };
+        let (short, shortened) = long.bounded(0.5);
+        assert!(shortened);
+        assert_relative_eq!(short.direction[0].length(), 0.5, max_relative = 1e-6);
+        assert_eq!(short.direction[1], Vec3::ZERO);
+        assert_eq!(short.position, [Vec3::ZERO, 1e30 * Vec3::X]);
+        assert_eq!(downwards().bounded(1.0), (downwards(), false));
+    }
+
+    #[test]
+    fn four_displacements_along_one_axis_add_as_variances() {
+        let spread = RayDifferential::<4> {
+            position: [3.0 * Vec3::X, Vec3::ZERO, 4.0 * Vec3::X, Vec3::ZERO],
+            ..RayDifferential::ZERO
+        };
+        let [one, other] = spread.footprint_axes(Vec3::Y);
+        let longest = if one.length() > other.length() { one } else { other };
+        assert!(longest.abs().abs_diff_eq(5.0 * Vec3::X, 1e-5));
+        assert_relative_eq!(one.cross(other).length(), 0.0, epsilon = 1e-4);
     }
 }

@@ -88,8 +88,9 @@ pub struct EnergyLedger {
     emitted: LedgerEntry,
     roulette_gain: DVec3,
     fates: [LedgerEntry; Fate::ALL.len()],
-    /// Events at which the geometric normal served because the interpolated one faced away from
-    /// the ray or would have sent light to the wrong side of the surface.
+    /// Directions, at most two for each event, for which the geometric normal served because the
+    /// interpolated one faced away from the ray or would have sent light to the wrong side of the
+    /// surface.
     pub normal_fallbacks: u64,
     /// Differentials that were shortened to the limit, at a critical angle or a grazing event.
     pub bounded_differentials: u64,

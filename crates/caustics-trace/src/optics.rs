@@ -2,7 +2,7 @@ use glam::Vec3;
 
 /// The direction of the mirror reflection of a unit `direction` off a surface with unit `normal`.
 ///
-/// The side on which `normal` lies does not matter.
+/// The side on which `normal` lies does not matter. The length is kept up to rounding.
 #[must_use]
 pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     direction - 2.0 * direction.dot(normal) * normal
@@ -11,15 +11,25 @@ pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
 /// The direction of a unit `direction` after refraction, or `None` on total reflection.
 ///
 /// `normal` is the unit normal on the side from which the light comes (`direction · normal < 0`);
-/// `eta` is the ratio of the refractive index that the light leaves to the one that it enters.
+/// `eta`, above 0, is the ratio of the refractive index that the light leaves to the one that it
+/// enters. The result has unit length.
 /// Snell's law: `t = eta d + (eta c - sqrt(1 - eta² (1 - c²))) n` with `c = -d · n`. Total
 /// reflection happens only on the way out of the denser medium (`eta > 1`).
 #[must_use]
 pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
     let cosine = -direction.dot(normal);
-    let squared = 1.0 - eta * eta * (1.0 - cosine * cosine).max(0.0);
+    let squared = transmitted_cosine_squared(cosine, eta);
     (squared > 0.0)
         .then(|| (eta * direction + (eta * cosine - squared.sqrt()) * normal).normalize_or_zero())
+}
+
+/// `1 - eta² (1 - c²)`, not above 0 on total reflection.
+///
+/// Written without the difference `1 - c²`, in which the cosine of grazing light is lost: media of
+/// nearly equal index would reflect it totally.
+fn transmitted_cosine_squared(cosine: f32, eta: f32) -> f32 {
+    // The cosine of two f32 unit vectors may exceed 1 by a rounding, the transmitted one may not.
+    ((1.0 - eta) * (1.0 + eta) + (eta * cosine) * (eta * cosine)).min(1.0)
 }
 
 /// The part of unpolarised light that a smooth dielectric interface reflects, in 0..=1.
@@ -31,7 +41,7 @@ pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
 #[must_use]
 pub fn fresnel_dielectric(cosine: f32, eta: f32) -> f32 {
     let cosine = cosine.clamp(0.0, 1.0);
-    let squared = 1.0 - eta * eta * (1.0 - cosine * cosine);
+    let squared = transmitted_cosine_squared(cosine, eta);
     if squared <= 0.0 {
         return 1.0;
     }
@@ -44,7 +54,8 @@ pub fn fresnel_dielectric(cosine: f32, eta: f32) -> f32 {
 /// The part of light that a metal reflects: Schlick's approximation (Schlick 1994).
 ///
 /// `normal_reflectance` is the reflectance at normal incidence (glTF's base colour of a metal),
-/// each channel in 0..=1; `cosine` is that of the angle between the light and the normal.
+/// each channel in 0..=1; `cosine` is that of the angle between the light and the normal. The
+/// result lies between `normal_reflectance` and 1, which it reaches at grazing incidence.
 #[must_use]
 pub fn fresnel_schlick(cosine: f32, normal_reflectance: Vec3) -> Vec3 {
     let grazing = 1.0 - cosine.clamp(0.0, 1.0);
@@ -52,8 +63,9 @@ pub fn fresnel_schlick(cosine: f32, normal_reflectance: Vec3) -> Vec3 {
     normal_reflectance + (Vec3::ONE - normal_reflectance) * (squared * squared * grazing)
 }
 
-/// The part of light left after `distance` metres in a medium with the absorption coefficient
-/// `attenuation` (per metre, each channel at least 0): the law of Beer and Lambert.
+/// The part of light left, in 0..=1, after `distance` metres (at least 0) in a medium with the
+/// absorption coefficient `attenuation` (per metre, each channel at least 0): the law of Beer and
+/// Lambert, `exp(-attenuation distance)`.
 #[must_use]
 pub fn beer_lambert(attenuation: Vec3, distance: f32) -> Vec3 {
     if attenuation == Vec3::ZERO {
@@ -110,6 +122,16 @@ mod tests {
         assert_eq!(fresnel_dielectric(critical * 0.999, 1.5), 1.0);
         assert!(fresnel_dielectric(critical * 1.01, 1.5) < 0.8);
         assert_eq!(refract(Vec3::new(0.9, -0.43589, 0.0), Vec3::Y, 1.5), None);
+    }
+
+    #[test]
+    fn a_boundary_between_equal_media_is_not_there_however_grazing_the_light() {
+        for cosine in [1.0f32, 0.5, 1e-3, 1e-5] {
+            assert!(fresnel_dielectric(cosine, 1.0) < 1e-12, "{cosine}");
+            let direction = Vec3::new((1.0 - cosine * cosine).sqrt(), -cosine, 0.0);
+            let refracted = refract(direction, Vec3::Y, 1.0).unwrap();
+            assert!(refracted.abs_diff_eq(direction, 2e-7), "{cosine}");
+        }
     }
 
     #[test]

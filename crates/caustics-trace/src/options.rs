@@ -54,7 +54,7 @@ pub struct TraceOptions {
 impl Default for TraceOptions {
     fn default() -> Self {
         Self {
-            photons: 1_000_000,
+            photons: 262_144,
             seed: 0,
             max_depth: 128,
             branching: Branching::SplitAll,

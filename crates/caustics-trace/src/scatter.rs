@@ -41,7 +41,9 @@ pub struct Scattering {
     outgoing: [Option<Outgoing>; 2],
     /// The part of the light that the surface absorbs, for each channel.
     pub absorbed: Vec3,
-    /// At how many directions the geometric normal stood in for the interpolated one.
+    /// For how many directions, at most two, the geometric normal stood in for the interpolated
+    /// one: for each outgoing direction that is not [`interpolated`](Outgoing::interpolated) at an
+    /// interface, and for a refraction that the geometric normal turned out to forbid.
     pub fallbacks: u32,
 }
 
@@ -55,9 +57,13 @@ impl Scattering {
 /// How a smooth dielectric or a metal scatters light that arrives at `point` along the unit
 /// `direction`; `None` on a receiver.
 ///
-/// `channel` is the colour channel (0, 1, 2) of light that dispersion has already split. The
-/// interpolated normal serves for directions and Fresnel terms. Where it faces away from the light
-/// or sends it to the wrong side of the surface, the geometric normal stands in, which is counted.
+/// `media` are those on the light's side of the surface, `channel` is the colour channel (0, 1, 2)
+/// of light that dispersion has already split, `None` for all channels together. The interpolated
+/// normal serves for directions and Fresnel terms. Where it faces away from the light or sends it
+/// to the wrong side of the surface, the geometric normal stands in, which is counted.
+///
+/// Dielectrics reflect by Fresnel's equations and refract by Snell's law, metals reflect by
+/// Schlick's approximation and absorb the rest.
 #[must_use]
 pub fn scatter(
     world: &World,
@@ -95,10 +101,6 @@ impl Normals {
         Self { geometric, serving: if interpolated { shading } else { geometric }, interpolated }
     }
 
-    fn fallbacks(&self) -> u32 {
-        u32::from(!self.interpolated)
-    }
-
     /// The reflected direction, the normal that it took, and whether that is the interpolated one.
     fn reflection(&self, direction: Vec3) -> (Vec3, Vec3, bool) {
         let reflected = reflect(direction, self.serving);
@@ -109,15 +111,29 @@ impl Normals {
         }
     }
 
-    /// Likewise for refraction; `None` where the light is totally reflected.
-    fn refraction(&self, direction: Vec3, eta: f32) -> Option<(Vec3, Vec3, bool)> {
-        let refracted = refract(direction, self.serving, eta)?;
-        if !self.interpolated || refracted.dot(self.geometric) < 0.0 {
-            Some((refracted, self.serving, self.interpolated))
-        } else {
-            refract(direction, self.geometric, eta).map(|it| (it, self.geometric, false))
+    /// Likewise for refraction.
+    fn refraction(&self, direction: Vec3, eta: f32) -> Refraction {
+        let by = |normal: Vec3, interpolated: bool| {
+            refract(direction, normal, eta).map_or(
+                Refraction::Total { interpolated },
+                |refracted| Refraction::Transmitted { refracted, normal, interpolated },
+            )
+        };
+        match by(self.serving, self.interpolated) {
+            Refraction::Transmitted { refracted, .. }
+                if self.interpolated && refracted.dot(self.geometric) >= 0.0 =>
+            {
+                by(self.geometric, false)
+            }
+            refraction => refraction,
         }
     }
+}
+
+/// What the boundary of a dielectric lets through, and whether the interpolated normal said so.
+enum Refraction {
+    Transmitted { refracted: Vec3, normal: Vec3, interpolated: bool },
+    Total { interpolated: bool },
 }
 
 fn passage(direction: Vec3, normals: &Normals, media: MediumStack) -> Scattering {
@@ -159,15 +175,31 @@ fn dielectric(
     before: MediumStack,
     beyond: MediumStack,
 ) -> Scattering {
-    let mut fallbacks = normals.fallbacks();
-    let refraction = normals.refraction(direction, eta);
-    let reflectance = match refraction {
-        Some(_) => fresnel_dielectric(-direction.dot(normals.serving), eta),
-        None => 1.0,
+    let mut fallbacks = 0;
+    let (reflectance, refracted) = match normals.refraction(direction, eta) {
+        Refraction::Transmitted { refracted, normal, interpolated } => {
+            fallbacks += u32::from(!interpolated);
+            let reflectance = fresnel_dielectric(-direction.dot(normals.serving), eta);
+            let refracted = Outgoing {
+                event: Event::Refraction,
+                direction: refracted,
+                weight: Vec3::splat(1.0 - reflectance),
+                normal,
+                interpolated,
+                eta,
+                media: beyond,
+            };
+            (reflectance, Some(refracted))
+        }
+        Refraction::Total { interpolated } => {
+            // Where the serving normal is the geometric one, the reflection below counts it.
+            fallbacks += u32::from(normals.interpolated && !interpolated);
+            (1.0, None)
+        }
     };
     let reflected = (reflectance > 0.0).then(|| {
         let (reflected, normal, interpolated) = normals.reflection(direction);
-        fallbacks += u32::from(normals.interpolated && !interpolated);
+        fallbacks += u32::from(!interpolated);
         Outgoing {
             event: Event::Reflection,
             direction: reflected,
@@ -176,18 +208,6 @@ fn dielectric(
             interpolated,
             eta: 1.0,
             media: before,
-        }
-    });
-    let refracted = refraction.map(|(refracted, normal, interpolated)| {
-        fallbacks += u32::from(normals.interpolated && !interpolated);
-        Outgoing {
-            event: Event::Refraction,
-            direction: refracted,
-            weight: Vec3::splat(1.0 - reflectance),
-            normal,
-            interpolated,
-            eta,
-            media: beyond,
         }
     });
     Scattering { outgoing: [reflected, refracted], absorbed: Vec3::ZERO, fallbacks }
