@@ -233,13 +233,13 @@ mod tests {
         let grid = HashGrid::new(&[[0.5, 0.5, 0.5]], 1.0).unwrap();
         let mut found = Vec::new();
         grid.within(Vec3::new(0.5, 0.5, -0.5), 1.0, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         grid.within(Vec3::new(0.5, 0.5, -0.5), 0.99, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         grid.within(Vec3::new(0.5, 0.5, 0.5), -1.0, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         assert_eq!(found, [(0, 1.0)]);
         let bad = [Vec3::ZERO, Vec3::NAN];

@@ -1,5 +1,7 @@
 //! The triangle tree against a brute-force search in f64.
 
+mod common;
+
 use caustics_accel::{AccelError, BvhOptions, BvhPreset, Instructions, Intersect, TriangleBvh};
 use caustics_geometry::glam::{DVec3, Vec3};
 use caustics_geometry::{Hit, Ray};
@@ -231,6 +233,81 @@ proptest! {
             prop_assert_eq!(detected.is_occluded(&ray), portable.is_occluded(&ray));
         }
     }
+}
+
+/// Rays from a small area through a fan of directions, many in one bundle, some along the axes.
+fn fans() -> impl Strategy<Value = (Vec<Vec3>, Vec<Vec3>)> {
+    let offset = prop::array::uniform3(-1.0_f32..1.0);
+    (
+        unit_coordinates(),
+        unit_coordinates(),
+        prop_oneof![Just(0.0_f32), Just(0.01), Just(0.05), Just(0.5)],
+        prop_oneof![Just(0.0_f32), Just(0.01)],
+        prop::array::uniform3(prop::bool::weighted(0.7)),
+        prop::collection::vec((offset.clone(), offset), 0..100),
+    )
+        .prop_map(|(from, to, fan, area, axes, offsets)| {
+            let axes = Vec3::from_array(axes.map(|kept| f32::from(u8::from(kept))));
+            let (from, to) = (Vec3::from_array(from), Vec3::from_array(to));
+            let direction = (to - from) * axes;
+            offsets
+                .into_iter()
+                .map(|(p, d)| {
+                    let d = Vec3::from_array(d) * axes * fan;
+                    (from + Vec3::from_array(p) * area, direction + d)
+                })
+                .unzip()
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn streams_find_what_single_rays_find(
+        (positions, triangles) in soup(),
+        (origins, directions) in fans(),
+        range in prop_oneof![Just((0.0_f32, f32::INFINITY)), Just((0.5_f32, 1.1_f32))],
+        options in options(),
+    ) {
+        let tree = TriangleBvh::new(&positions, &triangles, &options).unwrap();
+        let size = tree.bounds().diagonal().length().max(1e-3);
+        let middle = if tree.is_empty() { Vec3::ZERO } else { tree.bounds().center() };
+        let rays: Vec<Ray> = origins
+            .iter()
+            .zip(&directions)
+            .map(|(o, d)| Ray::with_range(middle + *o * size, *d * size, range.0, range.1))
+            .collect();
+        let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
+        let mut streamed = vec![None; rays.len()];
+        tree.closest_hits(&rays, &mut streamed);
+        prop_assert_eq!(single, streamed);
+    }
+}
+
+#[test]
+fn bundles_through_a_mesh_find_what_single_rays_find() {
+    let (positions, triangles) = common::icosphere(4, Vec3::ZERO);
+    let tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).unwrap();
+    let rays: Vec<Ray> = (0..10_000_u32)
+        .map(|i| {
+            let (x, y) = ((i % 100) as f32 / 80.0 - 0.7, (i / 100) as f32 / 80.0 - 0.6);
+            Ray::new(
+                Vec3::new(0.1, 0.2, 4.0),
+                Vec3::new(x, y, 0.3) - Vec3::new(0.1, 0.2, 4.0),
+            )
+        })
+        .collect();
+    let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
+    assert!(single.iter().flatten().count() > 5000);
+    let mut streamed = vec![None; rays.len()];
+    tree.closest_hits(&rays, &mut streamed);
+    assert_eq!(single, streamed);
+    // The shorter slice counts.
+    let mut few = vec![None; 21];
+    tree.closest_hits(&rays, &mut few);
+    assert_eq!(few, single[..21]);
+    tree.closest_hits(&rays[..3], &mut streamed);
 }
 
 #[test]
