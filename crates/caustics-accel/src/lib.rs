@@ -43,8 +43,11 @@
 //! (*Watertight Ray/Triangle Intersection*, JCGT 2013) in single precision without contraction,
 //! and boxes are widened by more than rounding can amount to (after Ize, *Robust BVH Ray
 //! Traversal*, JCGT 2013). The tests send a million rays at the edges and a million at the
-//! vertices of a closed sphere of 20480 triangles from inside it, and let none through; the test
-//! of Möller and Trumbore lets a tenth of them through.
+//! vertices of a closed sphere of 20480 triangles from inside it, and none gets through; the same
+//! was seen of 10^8 rays at edges and 10^8 at vertices, each asked for its closest hit and for
+//! occlusion (`cargo test --release -p caustics-accel --test watertight -- --ignored`, a minute
+//! and a half). The control in those tests, a test after Möller and Trumbore, does let rays
+//! through.
 //!
 //! # Deterministic
 //!

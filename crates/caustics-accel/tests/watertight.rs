@@ -95,8 +95,10 @@ fn the_same_rays_escape_through_moeller_trumbore() {
             .collect(),
     );
     let mut rays = AimedRays::new(&positions, &triangles, Vec3::ZERO);
-    assert!(escaped(&every, &mut rays, Aim::Edge, 20_000) > 100);
-    assert!(escaped(&every, &mut rays, Aim::Vertex, 20_000) > 100);
+    let [edge, vertex] =
+        [Aim::Edge, Aim::Vertex].map(|aim| escaped(&every, &mut rays, aim, 20_000));
+    println!("escaped of 40000 questions each: {edge} at edges, {vertex} at vertices");
+    assert!(edge > 100 && vertex > 100);
 }
 
 /// The long count: 10^8 rays at shared edges and 10^8 at vertices.

@@ -6,7 +6,8 @@ use caustics_geometry::{Hit, Ray};
 use super::layout::{Child, Node};
 use super::leaf_test::{Closest, ShearedRay};
 use super::traverse::{
-    STACK, Tree, WIDEN, child_of, closest_hit, entry, is_usable, lower_end, near_of, next_lane,
+    STACK, Slabs, Tree, WIDEN, child_of, closest_hit, entry, is_usable, lower_end, near_of,
+    next_lane, search, splat,
 };
 use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH};
 
@@ -14,6 +15,9 @@ use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH};
 const ROWS: usize = 2;
 /// Rays in a bundle.
 const BUNDLE: usize = ROWS * WIDTH;
+
+/// When no more than this many rays meet a node, each goes on alone: then it is no more work.
+const ALONE: u32 = 3;
 
 /// Squared sine of the largest angle between a bundle's rays and its first: about 5 degrees.
 const SPREAD_SQUARED: f32 = 0.0075;
@@ -92,7 +96,8 @@ fn trace<L: Lanes>(
     // Which rays meet the current child, a bit for each.
     let mut active = u64::MAX >> (64 - BUNDLE);
     loop {
-        if current.is_leaf() {
+        let is_leaf = current.is_leaf();
+        if is_leaf || active.count_ones() <= ALONE {
             while active != 0 {
                 let lane = active.trailing_zeros() as usize % BUNDLE;
                 active &= active - 1;
@@ -101,15 +106,16 @@ fn trace<L: Lanes>(
                     sheared[lane] = ShearedRay::new(&rays[lane]);
                 }
                 let before = closest[lane].limit;
-                sheared[lane].find_closest(
-                    lanes,
-                    tree.blocks,
-                    current.blocks(),
-                    &rays[lane],
-                    &mut closest[lane],
-                );
-                if closest[lane].limit < before {
-                    rows[lane / WIDTH].limit[lane % WIDTH] = closest[lane].limit * WIDEN;
+                let (ray, closest) = (&rays[lane], &mut closest[lane]);
+                if is_leaf {
+                    let leaf = current.blocks();
+                    sheared[lane].find_closest(lanes, tree.blocks, leaf, ray, closest);
+                } else {
+                    let slabs = rows[lane / WIDTH].slabs(lanes, hull.near_side, lane % WIDTH);
+                    search(lanes, tree, current, &slabs, &sheared[lane], ray, closest);
+                }
+                if closest.limit < before {
+                    rows[lane / WIDTH].limit[lane % WIDTH] = closest.limit * WIDEN;
                 }
             }
             farthest = farthest_limit(&rows);
@@ -285,6 +291,25 @@ impl Rows {
             }
             self.t_min[lane] = lower_end(ray);
             self.limit[lane] = closest.limit * WIDEN;
+        }
+    }
+
+    /// One ray for tests of eight boxes.
+    #[inline(always)]
+    fn slabs<L: Lanes>(&self, lanes: L, near_side: [usize; 3], lane: usize) -> Slabs<L::Floats> {
+        let [x, y, z] = &self.origin;
+        let origin = splat(lanes, [x[lane], y[lane], z[lane]]);
+        let [x, y, z] = &self.inverse_near;
+        let inverse_near = splat(lanes, [x[lane], y[lane], z[lane]]);
+        let [x, y, z] = &self.inverse_far;
+        let inverse_far = splat(lanes, [x[lane], y[lane], z[lane]]);
+        let t_min = lanes.splat(self.t_min[lane]);
+        Slabs {
+            origin,
+            inverse_near,
+            inverse_far,
+            near_side,
+            t_min,
         }
     }
 

@@ -60,43 +60,37 @@ pub(super) const MAX_DEPTH: usize = (STACK - 1) / 7;
 /// (after Ize, *Robust BVH Ray Traversal*, JCGT 2013, whose factor covers the slabs alone).
 pub(super) const WIDEN: f32 = 1.0 + 20.0 * (f32::EPSILON / 2.0);
 
-/// What is computed once for a ray.
-struct Prepared<F> {
+/// A ray for the test against boxes.
+pub(super) struct Slabs<F> {
     /// By axis.
-    origin: [F; 3],
+    pub(super) origin: [F; 3],
     /// Reciprocal of the direction, by axis, for the side of a box where the ray enters ...
-    inverse_near: [F; 3],
+    pub(super) inverse_near: [F; 3],
     /// ... and for the side where it leaves.
-    inverse_far: [F; 3],
+    pub(super) inverse_far: [F; 3],
     /// By axis, 0 where the ray enters through the lower bound and 1 where through the upper one.
-    near_side: [usize; 3],
-    t_min: F,
-    sheared: ShearedRay,
+    pub(super) near_side: [usize; 3],
+    pub(super) t_min: F,
 }
 
 #[inline(always)]
-fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
+pub(super) fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
     [lanes.splat(x), lanes.splat(y), lanes.splat(z)]
 }
 
-impl<F: Copy> Prepared<F> {
-    /// `None` for a ray that cannot hit anything: not finite, or an empty range.
+impl<F: Copy> Slabs<F> {
     #[inline(always)]
-    fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Option<Self> {
-        if !is_usable(ray) {
-            return None;
-        }
+    fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
         let inverse = direction.map(|d| 1.0 / d);
-        Some(Self {
+        Self {
             origin: splat(lanes, origin),
             inverse_near: splat(lanes, inverse),
             inverse_far: splat(lanes, inverse.map(|i| i * WIDEN)),
             near_side: direction.map(|d| usize::from(d.is_sign_negative())),
             t_min: lanes.splat(lower_end(ray)),
-            sheared: ShearedRay::new(ray),
-        })
+        }
     }
 
     /// Where the ray enters the children's boxes, and which ones it meets before `limit`.
@@ -196,30 +190,45 @@ fn descend(stack: &mut Stack<u64, STACK>, node: &Node, mut met: u32, near: &Row)
 
 #[inline(always)]
 pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
-    let prepared = Prepared::new(lanes, ray)?;
+    if !is_usable(ray) {
+        return None;
+    }
     let mut closest = Closest::new(ray);
+    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
+    search(lanes, tree, tree.root, &slabs, &sheared, ray, &mut closest);
+    closest.hit
+}
+
+/// Looks below one child for something closer.
+#[inline(always)]
+pub(super) fn search<L: Lanes>(
+    lanes: L,
+    tree: Tree<'_>,
+    start: Child,
+    slabs: &Slabs<L::Floats>,
+    sheared: &ShearedRay,
+    ray: &Ray,
+    closest: &mut Closest,
+) {
     let mut widened = closest.limit * WIDEN;
     let mut stack = Stack::<u64, STACK>::new();
-    let mut current = tree.root;
+    let mut current = start;
     loop {
         while !current.is_leaf() {
             let node = &tree.nodes[current.index()];
-            let (near, met) = prepared.meet(lanes, node, lanes.splat(widened));
+            let (near, met) = slabs.meet(lanes, node, lanes.splat(widened));
             if met == 0 {
                 break;
             }
             current = descend(&mut stack, node, met, &lanes.store(near));
         }
         if current.is_leaf() {
-            let leaf = current.blocks();
-            prepared
-                .sheared
-                .find_closest(lanes, tree.blocks, leaf, ray, &mut closest);
+            sheared.find_closest(lanes, tree.blocks, current.blocks(), ray, closest);
             widened = closest.limit * WIDEN;
         }
         loop {
             let Some(next) = stack.pop() else {
-                return closest.hit;
+                return;
             };
             if near_of(next) <= widened {
                 current = child_of(next);
@@ -231,9 +240,10 @@ pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Opti
 
 #[inline(always)]
 fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
-    let Some(prepared) = Prepared::new(lanes, ray) else {
+    if !is_usable(ray) {
         return false;
-    };
+    }
+    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
     let limit = ray.t_max.next_down();
     let widened = lanes.splat(limit * WIDEN);
     let mut stack = Stack::<u64, STACK>::new();
@@ -242,15 +252,12 @@ fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
         let current = child_of(next);
         if current.is_leaf() {
             let leaf = current.blocks();
-            if prepared
-                .sheared
-                .hits_any(lanes, tree.blocks, leaf, ray, limit)
-            {
+            if sheared.hits_any(lanes, tree.blocks, leaf, ray, limit) {
                 return true;
             }
         } else {
             let node = &tree.nodes[current.index()];
-            let (_, mut met) = prepared.meet(lanes, node, widened);
+            let (_, mut met) = slabs.meet(lanes, node, widened);
             while met != 0 {
                 stack.push(u64::from(node.children[next_lane(&mut met)].0));
             }
