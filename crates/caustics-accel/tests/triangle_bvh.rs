@@ -502,3 +502,50 @@ fn distances_hold_from_tiny_to_huge() {
         assert!((f64::from(hit.t) / expected - 1.0).abs() < 3e-7, "{scale}");
     }
 }
+
+#[test]
+fn refitted_trees_find_what_new_ones_find() {
+    let (positions, triangles) = common::icosphere(4, Vec3::ZERO);
+    let options = BvhOptions::default();
+    let mut tree = TriangleBvh::new(&positions, &triangles, &options).unwrap();
+    assert_eq!(tree.refit(&positions, &triangles), Ok(1.0));
+    let twisted: Vec<Vec3> = positions
+        .iter()
+        .map(|p| {
+            let (sin, cos) = (2.0 * p.y).sin_cos();
+            Vec3::new(cos * p.x - sin * p.z, 1.5 * p.y, sin * p.x + cos * p.z) + Vec3::X
+        })
+        .collect();
+    let worse = tree.refit(&twisted, &triangles).unwrap();
+    assert!(worse > 1.05 && worse < 5.0, "{worse}");
+    let fresh = TriangleBvh::new(&twisted, &triangles, &options).unwrap();
+    assert_eq!(tree.bounds(), fresh.bounds());
+    let mut found = 0;
+    for i in 0..5000_u32 {
+        let (a, b) = (i as f32 * 0.7, i as f32 * 0.1);
+        let origin = Vec3::new(a.sin(), b.cos(), (a + b).cos()) * 3.0;
+        let ray = Ray::new(origin, Vec3::new(1.0, 0.4 * b.sin(), 0.2) - origin);
+        assert_eq!(tree.closest_hit(&ray), fresh.closest_hit(&ray));
+        found += u32::from(fresh.is_occluded(&ray));
+    }
+    assert!(found > 2000);
+}
+
+#[test]
+fn refitting_refuses_another_mesh() {
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let triangles = [[0, 1, 2], [0, 1, 1]];
+    let mut tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).unwrap();
+    assert_eq!(
+        tree.refit(&positions, &triangles[..1]),
+        Err(AccelError::TriangleCountChanged {
+            given: 1,
+            expected: 2
+        })
+    );
+    assert_eq!(
+        tree.refit(&positions, &[[0, 1, 2], [0, 1, 2]]),
+        Err(AccelError::TriangleAppeared { triangle: 1 })
+    );
+    assert!(tree.refit(&positions, &triangles).is_ok());
+}

@@ -2,6 +2,7 @@ mod binary_tree;
 mod collapse;
 mod layout;
 mod leaf_test;
+mod refit;
 mod stream;
 mod traverse;
 
@@ -63,6 +64,8 @@ pub struct TriangleBvh {
     triangles: usize,
     /// Those that can be hit.
     stored: usize,
+    /// What a ray may expect to pay, when the tree was built.
+    fresh_cost: f32,
     dispatch: Dispatch,
 }
 
@@ -98,9 +101,7 @@ impl TriangleBvh {
             .filter_map(|triangle| {
                 let [a, b, c] = corners(triangle).map(Vec3A::from);
                 let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-                // A triangle that is a line along an axis or a point cannot be hit.
-                let is_flat = (high - low).cmpgt(Vec3A::ZERO).bitmask().count_ones() < 2;
-                (!is_flat).then_some(TriangleBounds {
+                can_be_hit(low, high).then_some(TriangleBounds {
                     low,
                     high,
                     triangle,
@@ -121,15 +122,17 @@ impl TriangleBvh {
             root,
             depth: _,
         } = wide;
-        let tree = Self {
+        let mut tree = Self {
             nodes,
             blocks,
             root,
             bounds,
             triangles: triangles.len(),
             stored: boxes.len(),
+            fresh_cost: 0.0,
             dispatch: Dispatch::new(options.instructions),
         };
+        tree.fresh_cost = tree.expected_cost();
         debug_assert!(tree.is_valid());
         Ok(tree)
     }
@@ -239,6 +242,11 @@ impl Intersect for TriangleBvh {
             ray,
         })
     }
+}
+
+/// A triangle that is a line along an axis or a point cannot be hit.
+fn can_be_hit(low: Vec3A, high: Vec3A) -> bool {
+    (high - low).cmpgt(Vec3A::ZERO).bitmask().count_ones() >= 2
 }
 
 fn validate<P: Copy + Into<Vec3>>(
