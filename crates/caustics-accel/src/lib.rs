@@ -58,7 +58,8 @@
 //!
 //! # Limits
 //!
-//! Structures are built once; photons and triangles are not added to them later. Coordinates must
+//! Structures are built once; photons and triangles are not added to them later, though a tree can
+//! [follow](TriangleBvh::refit) a mesh that deforms. Coordinates must
 //! be finite, and those of triangles no larger than [`TriangleBvh::MAX_COORDINATE`]: both are
 //! checked. `NaN` and infinite rays and queries find nothing.
 //!
