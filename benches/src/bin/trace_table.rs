@@ -47,7 +47,7 @@ fn main() {
             caustics_benches::embree::Embree::new(&mesh, caustics_benches::embree::Mode::Robust),
         );
         for (kind, rays) in [("coherent", &coherent), ("incoherent", &incoherent)] {
-            let mut tracers: Vec<Tracer<'_>> = Vec::new();
+            let mut tracers: Vec<Tracer<'_>> = Vec::with_capacity(8);
             #[cfg(feature = "embree")]
             {
                 tracers.push((
