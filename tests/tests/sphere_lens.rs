@@ -123,7 +123,7 @@ fn nearest_photons_give_the_irradiance() -> Result<(), TestError> {
             // Mean over the circle, and the worst place on it.
             let (mut sum, mut worst) = (0.0, 0.0f64);
             for step in 0..16 {
-                let at = radius * DVec2::from_angle(0.1 + f64::from(step) * 0.392_7);
+                let at = radius * DVec2::from_angle(0.1 + f64::from(step) * std::f64::consts::FRAC_PI_8);
                 let position = Vec3::new(at.x as f32, -lens.floor_distance as f32, at.y as f32);
                 let found = estimate.irradiance(position, Vec3::Y, &mut scratch);
                 let ratio = f64::from(found.x) / exact;
