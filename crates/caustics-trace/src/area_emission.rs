@@ -13,7 +13,7 @@ use crate::emission::{Emission, EmissionSample, differential};
 /// on the light, so that each may be narrower than the cell without leaving gaps. Of widths from
 /// 0.07 to 1, this one had the least error under a square lamp over a glass sphere, at 65,536
 /// photons (6 times less than the whole cell) and at 262,144 (7 times).
-const NARROWING: f32 = 0.2;
+pub(crate) const NARROWING: f32 = 0.2;
 
 /// The rays from one side of an emissive object, towards a sphere if one is given.
 ///

@@ -4,6 +4,7 @@ use caustics_sampling::CounterRng;
 use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
 
+use crate::area_emission::NARROWING;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
 use crate::ledger::{EnergyLedger, Fate};
@@ -15,6 +16,7 @@ use crate::scatter::{Event, Outgoing, Scattering, scatter};
 
 /// The longest change of direction, in radians for one sample spacing, that a differential keeps.
 /// Beyond it a first derivative says nothing about where the neighbour goes.
+/// It is less for lights with an area, by as much as their photons are narrowed.
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
 
 /// A path, or a branch of one, on its way to the next surface.
@@ -48,6 +50,9 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
+    const DIRECTION_CHANGE_LIMIT: f32 =
+        if N > 2 { NARROWING * DIRECTION_CHANGE_LIMIT } else { DIRECTION_CHANGE_LIMIT };
+
     pub(crate) fn new(world: &'a World, intersect: &'a I, options: &'a TraceOptions) -> Self {
         Self {
             world,
@@ -228,7 +233,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
         let differential = self.scattered(branch, point, outgoing).scaled(kept.powf(-1.0 / N as f32));
-        let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
+        let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let origin = point.spawn.origin_towards(point.geometric_normal, outgoing.direction);
         self.pending.push(Branch {
