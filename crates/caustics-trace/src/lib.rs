@@ -115,6 +115,7 @@ mod media;
 mod optics;
 mod options;
 mod photon;
+mod refine;
 mod scatter;
 mod trace;
 mod tracer;
@@ -128,7 +129,7 @@ pub use optics::{
     CHANNEL_WAVELENGTHS, beer_lambert, dispersed_ior, fresnel_dielectric, fresnel_schlick, reflect,
     refract,
 };
-pub use options::{Aim, Branching, TraceError, TraceOptions};
+pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
 pub use photon::{Photon, PhotonMap};
 pub use scatter::{Event, Outgoing, Scattering, scatter};
 pub use trace::trace_photons;
