@@ -6,3 +6,7 @@ pub mod meshes;
 pub mod photons;
 pub mod random;
 pub mod rays;
+pub mod receivers;
+pub mod score;
+pub mod stage;
+pub mod timing;
