@@ -183,6 +183,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             Branching::SplitFirst => !branch.has_split,
             Branching::SplitAll => true,
         };
+        let branch = &Branch { has_split: branch.has_split || (both && splits), ..*branch };
         if both && !splits {
             // The Fresnel term is the same for all channels, so the choice leaves the flux as it is.
             let choice = rng.next_f32();
@@ -243,7 +244,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             media: outgoing.media,
             depth: branch.depth,
             events: branch.events + u32::from(outgoing.event != Event::Passage),
-            has_split: branch.has_split || outgoing.weight.max_element() < 1.0,
+            has_split: branch.has_split,
             channel: branch.channel,
             path: extended(branch.path, point.object, 1 + outgoing.event as u32),
         });

@@ -7,27 +7,27 @@ use glam::Vec3;
 /// A glass sphere over a floor, and a lamp.
 fn world() -> World {
     let mut scene = Scene::new();
-    let glass = scene.add_material(Material::dielectric("glass", 1.5)).unwrap();
-    let white = scene.add_material(Material::diffuse("white", [0.8; 3])).unwrap();
+    let glass = scene.add_material(Material::dielectric("glass", 1.5)).expect("valid");
+    let white = scene.add_material(Material::diffuse("white", [0.8; 3])).expect("valid");
     let ball = Shape::Sphere { center: Vec3::new(0.0, 1.5, 0.0), radius: 1.0 };
-    scene.add_instance(Instance::new("ball", ball, glass)).unwrap();
+    scene.add_instance(Instance::new("ball", ball, glass)).expect("valid");
     let floor = caustics_geometry::shapes::quad(
         [-5.0, 0.0, 5.0],
         [10.0, 0.0, 0.0],
         [0.0, 0.0, -10.0],
     );
-    let floor = Shape::Mesh(scene.add_mesh(floor.unwrap()));
-    scene.add_instance(Instance::new("floor", floor, white)).unwrap();
-    scene.add_light(Light::point([-1.0, 6.0, 0.5], [100.0; 3]).unwrap()).unwrap();
-    World::new(&scene).unwrap()
+    let floor = Shape::Mesh(scene.add_mesh(floor.expect("valid")));
+    scene.add_instance(Instance::new("floor", floor, white)).expect("valid");
+    scene.add_light(Light::point([-1.0, 6.0, 0.5], [100.0; 3]).expect("valid")).expect("valid");
+    World::new(&scene).expect("valid")
 }
 
 fn trace(levels: u32, photons: u32, seed: u64) -> PhotonMap {
     let world = world();
-    let intersector = world.intersector(&BvhOptions::default()).unwrap();
+    let intersector = world.intersector(&BvhOptions::default()).expect("valid");
     let refinement = Refinement { levels, ..Refinement::default() };
     let options = TraceOptions { photons, seed, refinement, ..TraceOptions::default() };
-    trace_photons(&world, &intersector, &options, &|_| {}).unwrap()
+    trace_photons(&world, &intersector, &options, &|_| {}).expect("valid")
 }
 
 fn stored(ledger: &EnergyLedger) -> f64 {
