@@ -34,15 +34,15 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
     pub fn radiance(&self, receiver: &Receiver, rng: &mut CounterRng) -> Vec3 {
         let mut irradiance = Vec3::ZERO;
         for light in self.world.lights() {
-            irradiance += self.from_light(receiver, light);
+            irradiance += self.arriving_from(receiver, light);
         }
         for light in self.world.emitters() {
-            irradiance += self.from_area(receiver, light, rng);
+            irradiance += self.arriving_from_area(receiver, light, rng);
         }
         receiver.albedo * FRAC_1_PI * irradiance
     }
 
-    fn from_light(&self, receiver: &Receiver, light: &Light) -> Vec3 {
+    fn arriving_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
         let position = receiver.point.spawn.position;
         let (direction, distance, facing) = match *light {
             Light::Point { position: lamp, .. } | Light::Spot { position: lamp, .. } => {
@@ -64,7 +64,7 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         cosine * facing
     }
 
-    fn from_area(&self, receiver: &Receiver, light: &AreaLight, rng: &mut CounterRng) -> Vec3 {
+    fn arriving_from_area(&self, receiver: &Receiver, light: &AreaLight, rng: &mut CounterRng) -> Vec3 {
         let sample = rng.next_vec2();
         let (primitive, along) = light.choose(sample.x);
         let Some(on_light) = self.world.point_on(primitive, Vec2::new(along, sample.y)) else {

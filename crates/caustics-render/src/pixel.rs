@@ -4,7 +4,7 @@ use glam::Vec2;
 /// The fractional parts of these multiples fill the unit square evenly at every count: the
 /// two-dimensional analogue of the golden ratio (Roberts, *The Unreasonable Effectiveness of
 /// Quasirandom Sequences*, 2018).
-const STEP: Vec2 = Vec2::new(0.754_877_67, 0.569_840_3);
+const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
 
 /// The points of a pixel, in 0..1 on both axes, through which its eye rays go.
 #[derive(Clone, Copy, Debug)]
