@@ -77,7 +77,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let reporter = Reporter::new();
     let caustics = Caustics::with_progress(&scene, &arguments.caustics, &|progress| {
-        reporter.advance(progress)
+        reporter.advance(progress);
     })
     .map_err(|error| format!("{name}: {error}"))?;
     if caustics.map().photons.is_empty() && arguments.caustics.trace.photons > 0 {
@@ -86,7 +86,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let picture = caustics
         .render_with_progress(&camera, &arguments.picture, &|progress| {
-            reporter.advance(progress)
+            reporter.advance(progress);
         })
         .map_err(|error| format!("{name}: {error}"))?;
     let render_seconds = start.elapsed().as_secs_f64();
