@@ -30,6 +30,8 @@ struct Branch<const N: usize> {
     events: u32,
     has_split: bool,
     channel: Option<u8>,
+    /// A hash of what the path met and did there.
+    path: u32,
 }
 
 /// Traces photons one at a time; holds the memory that they share.
@@ -39,6 +41,9 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     options: &'a TraceOptions,
     pending: Vec<Branch<N>>,
     pub(crate) photons: Vec<Photon>,
+    /// For each photon, a hash of what its path met and did there: photons of one path are parts of
+    /// one smooth sheet of light.
+    pub(crate) paths: Vec<u32>,
     pub(crate) ledger: EnergyLedger,
 }
 
@@ -50,6 +55,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             options,
             pending: Vec::new(),
             photons: Vec::new(),
+            paths: Vec::new(),
             ledger: EnergyLedger::default(),
         }
     }
@@ -67,6 +73,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: 0,
             has_split: false,
             channel: None,
+            path: 0,
         });
         while let Some(branch) = self.pending.pop() {
             self.advance(branch, threshold, rng);
@@ -150,6 +157,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             object: point.object,
             events: branch.events,
         });
+        self.paths.push(extended(branch.path, point.object, 0));
     }
 
     fn branch_out(
@@ -232,6 +240,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: branch.events + u32::from(outgoing.event != Event::Passage),
             has_split: branch.has_split || outgoing.weight.max_element() < 1.0,
             channel: branch.channel,
+            path: extended(branch.path, point.object, 1 + outgoing.event as u32),
         });
     }
 
@@ -262,4 +271,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             ),
         }
     }
+}
+
+/// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
+/// whole words).
+fn extended(path: u32, object: u32, event: u32) -> u32 {
+    let word = object.wrapping_mul(4).wrapping_add(event).wrapping_add(0x9E37_79B9);
+    (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
 }

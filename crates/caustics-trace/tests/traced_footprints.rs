@@ -10,11 +10,12 @@ mod common;
 use caustics_accel::Intersect;
 use caustics_geometry::shapes::icosphere;
 use caustics_geometry::{Hit, Ray, Sphere};
+use caustics_sampling::{PointSet, Sequence};
 use caustics_scene::{Light, Material, Scene, SceneIntersector, World};
 use caustics_trace::glam::{DVec3, Vec3};
-use caustics_trace::{Aim, Emitter, Photon, RayDifferential};
-use common::chain::{Chain, Change, Jitter, Shape, changed, is_regular};
+use caustics_trace::{Aim, EmissionSample, Emitter, Photon, RayDifferential};
 use common::central::{PointAndDirection, derivative};
+use common::chain::{Chain, Change, Jitter, Shape, changed, is_regular};
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened, single_ray, trace_one};
 use common::{direction, reflect_exactly, refract_exactly, relative_error};
 use proptest::prelude::*;
@@ -47,10 +48,15 @@ struct Ball {
 /// leave, per spacing.
 fn initial_turns(scene: &Scene, origin: Vec3, onwards: Vec3) -> [Vec3; 2] {
     let mut scene = scene.clone();
-    scene.add_light(single_ray(origin, onwards, SPACING)).expect("a valid light");
+    scene
+        .add_light(single_ray(origin, onwards, SPACING))
+        .expect("a valid light");
     let world = World::new(&scene).expect("a small world");
     let emitters = Emitter::all(&world, Aim::Everywhere);
-    let emission = emitters[0].emit::<2>([0.5; 4], 1).expect("a spot light has no horizon");
+    let sample = EmissionSample::of(&PointSet::new(Sequence::Grid, 1, 0), 0);
+    let emission = emitters[0]
+        .emit::<2>(&sample)
+        .expect("the axis is in the cone");
     assert!((emission.ray.direction - onwards.normalize()).length() < 1e-6);
     emission.differential.direction
 }
@@ -137,7 +143,11 @@ fn exact_paths<'a>(balls: &'a [Ball], origin: DVec3, onwards: DVec3) -> Vec<(Exa
         if let Body::Glass(ior) = *body {
             let ior = f64::from(ior);
             let eta = if inside { ior } else { ior.recip() };
-            let critical = if eta > 1.0 { eta.recip().asin() - cosine.acos() } else { 1.0 };
+            let critical = if eta > 1.0 {
+                eta.recip().asin() - cosine.acos()
+            } else {
+                1.0
+            };
             if let Some(refracted) = refract_exactly(onwards, normal, eta) {
                 pending.push((with(true), at, refracted, margin.min(critical)));
             }
@@ -168,16 +178,27 @@ fn draw() -> impl Strategy<Value = Draw> {
                 .enumerate()
                 .map(|(place, (shift, radius, body))| {
                     // The second stands lower, where the first throws its light.
-                    let seat = [Vec3::ZERO, Vec3::new(0.9, -0.8, 0.4), Vec3::new(-1.9, 0.1, 0.0)];
+                    let seat = [
+                        Vec3::ZERO,
+                        Vec3::new(0.9, -0.8, 0.4),
+                        Vec3::new(-1.9, 0.1, 0.0),
+                    ];
                     let radius = if place == 1 { 0.5 * radius } else { radius };
                     let sphere = Sphere::new(seat[place] + 0.5 * Vec3::from(shift), radius);
-                    Ball { sphere: sphere.expect("a valid sphere"), body }
+                    Ball {
+                        sphere: sphere.expect("a valid sphere"),
+                        body,
+                    }
                 })
                 .collect();
             let first = balls[0].sphere;
             let inside = depth * f64::from(first.radius) * direction(cosine, azimuth);
             let aim = first.center.as_dvec3() + inside;
-            Draw { balls, origin: Vec3::new(0.0, 3.0, 0.0) + Vec3::from(origin), aim }
+            Draw {
+                balls,
+                origin: Vec3::new(0.0, 3.0, 0.0) + Vec3::from(origin),
+                aim,
+            }
         })
 }
 
@@ -250,7 +271,9 @@ fn axes_of_photons_through_spheres_are_exact_derivatives() {
         }
         let turns = initial_turns(&scene, draw.origin, ray);
         for (path, margin) in exact_paths(&draw.balls, draw.origin.as_dvec3(), onwards) {
-            let Some(landed) = path.follow(draw.origin.as_dvec3(), onwards) else { continue };
+            let Some(landed) = path.follow(draw.origin.as_dvec3(), onwards) else {
+                continue;
+            };
             let exact = (margin > common::MARGIN && landed.position.abs().max_element() < 100.0)
                 .then(|| exact_axes(&path, &draw, turns))
                 .flatten();
@@ -267,10 +290,16 @@ fn axes_of_photons_through_spheres_are_exact_derivatives() {
                     let distance = |it: &Photon| it.position.as_dvec3().distance(landed.position);
                     distance(a).total_cmp(&distance(b))
                 });
-            prop_assert!(found.is_some(), "no photon of {events} events at {landed:?}");
+            prop_assert!(
+                found.is_some(),
+                "no photon of {events} events at {landed:?}"
+            );
             let photon = found.expect("just checked");
             let miss = photon.position.as_dvec3().distance(landed.position);
-            prop_assert!(miss < 1e-3 * (1.0 + landed.position.length()), "{miss} off: {landed:?}");
+            prop_assert!(
+                miss < 1e-3 * (1.0 + landed.position.length()),
+                "{miss} off: {landed:?}"
+            );
             kept.set(kept.get() + 1);
             let mut counts = by_events.get();
             counts[events] += 1;
@@ -286,7 +315,11 @@ fn axes_of_photons_through_spheres_are_exact_derivatives() {
         Ok(())
     });
     let (kept, skipped) = (kept.get(), skipped.get());
-    println!("{kept} kept, {skipped} skipped, by events {:?}, worst error {:e}", by_events.get(), worst.get());
+    println!(
+        "{kept} kept, {skipped} skipped, by events {:?}, worst error {:e}",
+        by_events.get(),
+        worst.get()
+    );
     if let Err(failure) = outcome {
         panic!("{failure}");
     }
@@ -331,11 +364,16 @@ impl Landing {
 /// Where the photon goes that a light sends along its axis, in all its branches; and whether
 /// anything on the way was bounded or took a geometric normal instead of an interpolated one.
 fn landings(scene: &Scene, tracer: &SceneIntersector, light: Light) -> (Vec<Landing>, bool) {
-    let recorder = Recorder { tracer, hits: Mutex::default() };
+    let recorder = Recorder {
+        tracer,
+        hits: Mutex::default(),
+    };
     let map = trace_one(scene, &recorder, light);
     let hits = recorder.hits.into_inner().expect("one thread");
     // Photons are in the order in which their branches hit the floor, which is the first object.
-    let on_floor: Vec<usize> = (0..hits.len()).filter(|&it| hits[it].1.primitive < 2).collect();
+    let on_floor: Vec<usize> = (0..hits.len())
+        .filter(|&it| hits[it].1.primitive < 2)
+        .collect();
     assert_eq!(on_floor.len(), map.photons.len());
     let landings = map
         .photons
@@ -354,7 +392,10 @@ fn landings(scene: &Scene, tracer: &SceneIntersector, light: Light) -> (Vec<Land
                 });
             }
             assert_eq!(path.len() as u32, photon.events + 1);
-            Landing { photon: *photon, path }
+            Landing {
+                photon: *photon,
+                path,
+            }
         })
         .collect();
     let limited = map.ledger.bounded_differentials + map.ledger.normal_fallbacks > 0;
@@ -368,8 +409,18 @@ fn ball_and_mirror(subdivisions: u32) -> Scene {
     let mut scene = Scene::new();
     add_floor(&mut scene, FLOOR, 20.0);
     let ball = icosphere(0.6, subdivisions).expect("a valid sphere");
-    add_mesh(&mut scene, "ball", ball, Material::dielectric("glass", GLASS));
-    add_sphere(&mut scene, Vec3::new(1.2, -0.9, 0.3), 0.4, Material::metal("mirror", [0.9; 3]));
+    add_mesh(
+        &mut scene,
+        "ball",
+        ball,
+        Material::dielectric("glass", GLASS),
+    );
+    add_sphere(
+        &mut scene,
+        Vec3::new(1.2, -0.9, 0.3),
+        0.4,
+        Material::metal("mirror", [0.9; 3]),
+    );
     scene
 }
 
@@ -391,17 +442,25 @@ fn chain_of(world: &World, landing: &Landing, turns: [Vec3; 2]) -> Option<Chain>
     let mut chain = Chain {
         origin: first.origin,
         direction: first.direction,
-        differential: RayDifferential { position: [Vec3::ZERO; 2], direction: turns },
+        differential: RayDifferential {
+            position: [Vec3::ZERO; 2],
+            direction: turns,
+        },
         events: Vec::new(),
         scale: 1.0,
     };
-    let (mut position, mut onwards) =
-        (first.origin.as_dvec3(), first.direction.as_dvec3().normalize());
+    let (mut position, mut onwards) = (
+        first.origin.as_dvec3(),
+        first.direction.as_dvec3().normalize(),
+    );
     for (place, (ray, hit)) in steps.iter().enumerate() {
         let surface = world.surface(ray, hit).expect("a hit");
         let inside = !surface.from_outside;
         let shape = match (world.sphere(hit.primitive), world.triangle(hit.primitive)) {
-            (Some(sphere), _) => Shape::Sphere { sphere: *sphere, inside },
+            (Some(sphere), _) => Shape::Sphere {
+                sphere: *sphere,
+                inside,
+            },
             (None, triangle) => Shape::Triangle {
                 triangle: triangle.expect("a triangle"),
                 normals: world.triangle_normals(hit.primitive).expect("its normals"),
@@ -412,7 +471,11 @@ fn chain_of(world: &World, landing: &Landing, turns: [Vec3; 2]) -> Option<Chain>
             Some((next, _)) => {
                 let goes_in = next.direction.dot(surface.geometric_normal) < 0.0;
                 let eta = if inside { GLASS } else { GLASS.recip() };
-                if goes_in != inside { Change::Refract(eta) } else { Change::Reflect }
+                if goes_in != inside {
+                    Change::Refract(eta)
+                } else {
+                    Change::Reflect
+                }
             }
         };
         let exact = shape.hit(position, onwards)?;
@@ -441,15 +504,24 @@ fn axes_of_photons_through_a_mesh_are_exact_derivatives() {
         let turns = initial_turns(&scene, origin, onwards);
         for landing in landings.iter().filter(|it| it.photon.events <= 6) {
             let events = landing.photon.events as usize;
-            let exact = chain_of(&world, landing, turns).filter(|_| !limited).and_then(|chain| {
-                let exact = chain.exact(Jitter::NONE)?;
-                let steady = (1..=6u64).all(|seed| {
-                    chain.exact(Jitter { seed, relative: JITTER }).is_some_and(|moved| {
-                        (0..2).all(|i| moved[i].relative_difference(&exact[i]) < 0.1 * TOLERANCE)
-                    })
+            let exact = chain_of(&world, landing, turns)
+                .filter(|_| !limited)
+                .and_then(|chain| {
+                    let exact = chain.exact(Jitter::NONE)?;
+                    let steady = (1..=6u64).all(|seed| {
+                        chain
+                            .exact(Jitter {
+                                seed,
+                                relative: JITTER,
+                            })
+                            .is_some_and(|moved| {
+                                (0..2).all(|i| {
+                                    moved[i].relative_difference(&exact[i]) < 0.1 * TOLERANCE
+                                })
+                            })
+                    });
+                    steady.then_some(exact)
                 });
-                steady.then_some(exact)
-            });
             let Some(exact) = exact else {
                 skipped[events] += 1;
                 continue;
@@ -458,14 +530,20 @@ fn axes_of_photons_through_a_mesh_are_exact_derivatives() {
             for (axis, exact) in landing.photon.axes.iter().zip(exact) {
                 let error = relative_error(*axis, exact.position);
                 worst = worst.max(error);
-                assert!(error < TOLERANCE, "off by {error:e} after {events}: {landing:?}");
+                assert!(
+                    error < TOLERANCE,
+                    "off by {error:e} after {events}: {landing:?}"
+                );
                 // The control: 0.2 per cent show.
                 assert!(relative_error(1.0021 * *axis, exact.position) > TOLERANCE);
             }
         }
     }
     println!("{kept:?} kept, {skipped:?} skipped, worst error {worst:e}");
-    assert!(kept.iter().sum::<u32>() > skipped.iter().sum::<u32>(), "{kept:?} of {skipped:?}");
+    assert!(
+        kept.iter().sum::<u32>() > skipped.iter().sum::<u32>(),
+        "{kept:?} of {skipped:?}"
+    );
 }
 
 /// Neighbours traced as photons of their own, in f32, where they meet the same triangles: at an

@@ -11,19 +11,26 @@ use caustics_trace::{Aim, Branching, PhotonMap, TraceOptions, trace_photons};
 pub(crate) fn add_mesh(scene: &mut Scene, name: &str, mesh: TriangleMesh, material: Material) {
     let shape = Shape::Mesh(scene.add_mesh(mesh));
     let material = scene.add_material(material).expect("a valid material");
-    scene.add_instance(Instance::new(name, shape, material)).expect("a valid instance");
+    scene
+        .add_instance(Instance::new(name, shape, material))
+        .expect("a valid instance");
 }
 
 pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: Material) {
     let material = scene.add_material(material).expect("a valid material");
     let shape = Shape::Sphere { center, radius };
-    scene.add_instance(Instance::new("sphere", shape, material)).expect("a valid instance");
+    scene
+        .add_instance(Instance::new("sphere", shape, material))
+        .expect("a valid instance");
 }
 
 /// A solid box between two corners.
 pub(crate) fn add_box(scene: &mut Scene, name: &str, from: Vec3, to: Vec3, material: Material) {
     let place = Affine3A::from_translation(0.5 * (from + to));
-    let mesh = cuboid(to - from).expect("a valid box").transformed(&place).expect("a finite box");
+    let mesh = cuboid(to - from)
+        .expect("a valid box")
+        .transformed(&place)
+        .expect("a finite box");
     add_mesh(scene, name, mesh, material);
 }
 
@@ -36,7 +43,9 @@ pub(crate) fn add_floor(scene: &mut Scene, height: f32, half: f32) {
 
 pub(crate) fn flattened(scene: &Scene) -> (World, SceneIntersector) {
     let world = World::new(scene).expect("a small world");
-    let intersector = SceneIntersector::new(&world, &BvhOptions::default()).expect("a small tree");
+    let intersector = world
+        .intersector(&BvhOptions::default())
+        .expect("a small tree");
     (world, intersector)
 }
 
