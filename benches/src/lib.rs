@@ -7,3 +7,7 @@ pub mod peers;
 pub mod photons;
 pub mod random;
 pub mod rays;
+pub mod receivers;
+pub mod score;
+pub mod stage;
+pub mod timing;

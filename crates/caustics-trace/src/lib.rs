@@ -57,6 +57,7 @@
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
 //! | aim lights at what makes caustics | [`Aim`], [`Emitter`], [`Emission`], [`EmissionSample`] | |
+//! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
 //! | carry derivatives along any path, from a light or the eye | [`RayDifferential`] | Igehy 1999 |

@@ -3,10 +3,12 @@
 use caustics_accel::{BvhOptions, Intersect};
 use caustics_geometry::TriangleMesh;
 use caustics_geometry::shapes::{cuboid, quad};
-use caustics_sampling::Sequence;
+use caustics_sampling::{PointSet, Sequence};
 use caustics_scene::{Instance, Light, Material, Scene, SceneIntersector, Shape, World};
 use caustics_trace::glam::{Affine3A, Vec3};
-use caustics_trace::{Aim, Branching, PhotonMap, TraceOptions, trace_photons};
+use caustics_trace::{
+    Aim, Branching, EmissionSample, Emitter, PhotonMap, TraceOptions, trace_photons,
+};
 
 pub(crate) fn add_mesh(scene: &mut Scene, name: &str, mesh: TriangleMesh, material: Material) {
     let shape = Shape::Mesh(scene.add_mesh(mesh));
@@ -75,4 +77,24 @@ pub(crate) fn trace_one(scene: &Scene, tracer: &impl Intersect, light: Light) ->
     scene.add_light(light).expect("a valid light");
     let world = World::new(&scene).expect("a small world");
     trace_photons(&world, tracer, &ONE_PHOTON(), &|_| {}).expect("valid options")
+}
+
+/// The spacing of photons, in radians: about as small as a spot light can be, so that few
+/// differentials meet their bound.
+pub(crate) const SPACING: f32 = 2e-3;
+
+/// The changes of direction, for one spacing each, of the neighbours of a light's only ray.
+pub(crate) fn initial_turns(scene: &Scene, origin: Vec3, onwards: Vec3) -> [Vec3; 2] {
+    let mut scene = scene.clone();
+    scene
+        .add_light(single_ray(origin, onwards, SPACING))
+        .expect("a valid light");
+    let world = World::new(&scene).expect("a small world");
+    let emitters = Emitter::all(&world, Aim::Everywhere);
+    let sample = EmissionSample::of(&PointSet::new(Sequence::Grid, 1, 0), 0);
+    let emission = emitters[0]
+        .emit::<2>(&sample)
+        .expect("the axis is in the cone");
+    assert!((emission.ray.direction - onwards.normalize()).length() < 1e-6);
+    emission.differential.direction
 }

@@ -1,0 +1,107 @@
+//! Photons traced, footprints splatted and points looked up, a second, on two of the public scenes.
+//!
+//! Differentials are part of every photon: tracing without them is not offered, so there is no
+//! figure for it. What each timed stage makes is compared with the scene's reference first.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use caustics::CausticsOptions;
+use caustics::accel::NearestScratch;
+use caustics::filter::{Image, relative_mse};
+use caustics::render::{Estimate, FootprintGather, GBuffer, NearestEstimate, splat};
+use caustics::trace::trace_photons;
+use caustics_benches::receivers::{gather, receivers};
+use caustics_benches::stage::{Failure, Stage};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+
+const PHOTONS: u32 = 65_536;
+
+/// Of what error a picture is taken for the reference's at all: a black one has nearly 1 here.
+const MOST_ERROR: f64 = 0.5;
+
+fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
+    let stage = Stage::load(name)?;
+    let (width, height) = (stage.reference.width(), stage.reference.height());
+    let mut options = CausticsOptions::for_estimate(Estimate::default());
+    options.trace.photons = PHOTONS;
+    let trace = || trace_photons(&stage.world, &stage.intersector, &options.trace, &|_| {});
+    let map = trace()?;
+    let photons = &map.photons;
+    let buffer = GBuffer::new(
+        &stage.world,
+        &stage.intersector,
+        &stage.camera,
+        width,
+        height,
+    )?;
+    let points = receivers(&stage, width, height);
+    let footprints = FootprintGather::new(photons, &options.footprint)?;
+    let nearest = NearestEstimate::new(photons, &options.nearest)?;
+    let gathered = || {
+        gather(
+            &points,
+            width,
+            height,
+            || (),
+            |at, ()| footprints.irradiance(at.position, at.normal),
+        )
+    };
+    let looked_up = || {
+        gather(
+            &points,
+            width,
+            height,
+            NearestScratch::new,
+            |at, scratch| nearest.irradiance(at.position, at.normal, scratch),
+        )
+    };
+    let splatted = || splat(&buffer, photons, &options.footprint).map(|(image, _)| image);
+
+    let check = |what: &str, image: &Image| {
+        let error = relative_mse(image, &stage.reference)?;
+        if error < MOST_ERROR {
+            Ok(())
+        } else {
+            Err(Failure::from(format!(
+                "{name}: {what} is off by a relMSE of {error}"
+            )))
+        }
+    };
+    check("the splat", &splatted()?)?;
+    check("the footprint gather", &gathered()?)?;
+    check("the nearest photons", &looked_up()?)?;
+
+    let mut group = criterion.benchmark_group(name);
+    group
+        .sample_size(10)
+        .measurement_time(Duration::from_secs(5));
+    group.throughput(Throughput::Elements(u64::from(PHOTONS)));
+    group.bench_function("photons traced", |bencher| {
+        bencher.iter(|| black_box(trace()));
+    });
+    group.throughput(Throughput::Elements(photons.len() as u64));
+    group.bench_function("footprints splatted", |bencher| {
+        bencher.iter(|| black_box(splatted()));
+    });
+    group.throughput(Throughput::Elements(points.len() as u64));
+    group.bench_function("points gathered from footprints", |bencher| {
+        bencher.iter(|| black_box(gathered()));
+    });
+    group.bench_function("points gathered from nearest photons", |bencher| {
+        bencher.iter(|| black_box(looked_up()));
+    });
+    group.finish();
+    Ok(())
+}
+
+fn photon_pipeline(criterion: &mut Criterion) {
+    for name in ["p03_cognac", "p06_wave_plane"] {
+        if let Err(failure) = bench_scene(criterion, name) {
+            panic!("{failure}");
+        }
+    }
+}
+
+criterion_group!(benches, photon_pipeline);
+criterion_main!(benches);

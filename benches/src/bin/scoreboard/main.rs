@@ -1,0 +1,87 @@
+//! Times and scores every estimate on the public scenes, and writes the tables and charts of it.
+//!
+//! `cargo run --release -p caustics-benches --bin scoreboard -- --help` lists the options.
+
+mod arguments;
+mod chart;
+mod conditions;
+mod document;
+mod flip;
+mod measure;
+mod metric;
+mod nearest_search;
+mod tables;
+
+use std::fs;
+use std::process::ExitCode;
+
+use caustics_benches::score::{Row, from_csv, peers_from_csv, to_csv};
+use caustics_benches::stage::{Failure, Stage};
+
+use crate::arguments::{Arguments, USAGE};
+use crate::metric::Metric;
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse(std::env::args().skip(1)) {
+        Ok(Some(arguments)) => run(&arguments),
+        Ok(None) => {
+            print!("{USAGE}");
+            Ok(())
+        }
+        Err(failure) => Err(failure),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("scoreboard: {failure}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()?;
+    }
+    for folder in arguments.images.iter().chain([&arguments.svg]) {
+        fs::create_dir_all(folder)?;
+    }
+    let mut rows = if arguments.csv.exists() {
+        from_csv(&fs::read_to_string(&arguments.csv)?)?
+    } else {
+        Vec::new()
+    };
+    if arguments.measures {
+        let conditions = conditions::conditions(&arguments.machine);
+        for name in &arguments.scenes {
+            let stage = Stage::load(name)?;
+            let measured = measure::measure(&stage, arguments, &conditions)?;
+            replace(&mut rows, measured);
+            // After every scene, so that little is lost when the program is stopped.
+            fs::write(&arguments.csv, to_csv(&rows))?;
+        }
+    }
+    let peers = peers_from_csv(&fs::read_to_string(&arguments.peers)?)?;
+    for metric in Metric::ALL {
+        fs::write(
+            arguments.svg.join(metric.file()),
+            chart::chart(&rows, &peers, metric),
+        )?;
+    }
+    let document = fs::read_to_string(&arguments.document)
+        .map_err(|error| format!("{}: {error}", arguments.document.display()))?;
+    let written = document::with_tables(&document, &tables::all(&rows, &peers))?;
+    fs::write(&arguments.document, written)?;
+    Ok(())
+}
+
+/// Takes over new rows, in place of old ones of the same cases.
+fn replace(rows: &mut Vec<Row>, measured: Vec<Row>) {
+    rows.retain(|old| !measured.iter().any(|new| new.is_of_same_case(old)));
+    rows.extend(measured);
+    rows.sort_by(|a, b| {
+        (&a.scene, &a.estimate, a.photons).cmp(&(&b.scene, &b.estimate, b.photons))
+    });
+}
