@@ -108,6 +108,9 @@ pub struct Embree {
 impl Embree {
     /// Builds the scene.
     #[must_use]
+    ///
+    /// # Panics
+    /// If Embree makes no device.
     pub fn new(mesh: &Mesh, mode: Mode) -> Self {
         // SAFETY: handles go only where Embree's API wants them; the buffers have the size asked
         // for, plus the padding that Embree adds itself.

@@ -3,6 +3,7 @@
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod meshes;
+pub mod peers;
 pub mod photons;
 pub mod random;
 pub mod rays;

@@ -65,6 +65,9 @@ pub fn glass() -> Mesh {
 }
 
 /// A ball of 20 times 4 to the power of `subdivisions` triangles.
+///
+/// # Panics
+/// If the triangles are too many.
 #[must_use]
 pub fn icosphere(name: &'static str, subdivisions: u32) -> Mesh {
     let mesh = shapes::icosphere(1.0, subdivisions).expect("a valid sphere");

@@ -31,6 +31,7 @@ usage: render [options] [scene.glb | scene.gltf]
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
                                                                     (split-all)
+  --refine LEVELS           divide cells of the lattice at edges, so often (0)
   --aim NAME                where lights aim: casters, everywhere   (casters)
   --out FILE.png            the picture                             (caustics.png)
   --caustics-only FILE.exr  the caustics alone, linear radiance
@@ -97,6 +98,7 @@ pub(crate) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request
         }
     }
     result.picture.seed = result.caustics.trace.seed;
+    result.picture.validate().map_err(|error| format!("--width, --height: {error}"))?;
     Ok(Request::Render(Box::new(result)))
 }
 
@@ -104,22 +106,22 @@ impl Arguments {
     fn set(&mut self, name: &str, parser: &mut Parser) -> Result<(), String> {
         let trace = &mut self.caustics.trace;
         match name {
-            "width" => self.picture.width = number(name, parser)?,
-            "height" => self.picture.height = number(name, parser)?,
+            "width" => self.picture.width = positive(name, parser)?,
+            "height" => self.picture.height = positive(name, parser)?,
             "photons" => trace.photons = number(name, parser)?,
-            "samples" => self.picture.samples = number(name, parser)?,
+            "samples" => self.picture.samples = positive(name, parser)?,
             "seed" => trace.seed = number(name, parser)?,
             "camera" => self.camera = number(name, parser)?,
-            "threads" => {
-                let threads = number(name, parser)?;
-                if threads == 0 {
-                    return Err("--threads: at least 1".into());
-                }
-                self.threads = Some(threads);
-            }
+            "threads" => self.threads = Some(positive(name, parser)?),
             "exposure" => self.exposure = finite(name, parser)?,
-            "neighbours" => self.caustics.nearest.count = number(name, parser)?,
-            "radius" => self.caustics.nearest.max_radius = Some(finite(name, parser)?),
+            "neighbours" => self.caustics.nearest.count = positive(name, parser)?,
+            "radius" => {
+                let radius = finite(name, parser)?;
+                if radius <= 0.0 {
+                    return Err(format!("--radius {radius}: not above 0"));
+                }
+                self.caustics.nearest.max_radius = Some(radius);
+            }
             "estimate" => {
                 let estimate = choice(name, parser, &Estimate::ALL.map(|it| (it.name(), it)))?;
                 let preset = CausticsOptions::for_estimate(estimate);
@@ -142,6 +144,7 @@ impl Arguments {
                     ],
                 )?;
             }
+            "refine" => trace.refinement.levels = number(name, parser)?,
             "aim" => {
                 trace.aim = choice(
                     name,
@@ -179,6 +182,15 @@ fn path(name: &str, parser: &mut Parser) -> Result<PathBuf, String> {
 fn number<T: FromStr<Err: Display>>(name: &str, parser: &mut Parser) -> Result<T, String> {
     let text = text(name, parser)?;
     text.parse().map_err(|error| format!("--{name} {text}: {error}"))
+}
+
+/// A whole number of which there is at least one.
+fn positive<T>(name: &str, parser: &mut Parser) -> Result<T, String>
+where
+    T: FromStr<Err: Display> + Default + PartialEq,
+{
+    let value = number(name, parser)?;
+    if value == T::default() { Err(format!("--{name} 0: at least 1")) } else { Ok(value) }
 }
 
 fn finite(name: &str, parser: &mut Parser) -> Result<f32, String> {

@@ -4,14 +4,15 @@
 
 mod arguments;
 mod default_view;
+mod outputs;
 mod report;
 mod reporter;
 
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use caustics::filter::{Display, write_exr, write_png};
 use caustics::prelude::*;
 use caustics::scene::{builtin, gltf};
 
@@ -25,7 +26,8 @@ type Failure = String;
 fn main() -> ExitCode {
     match arguments::parse(std::env::args_os().skip(1)) {
         Ok(Request::Print(text)) => {
-            println!("{text}");
+            // A reader that has seen enough, such as `head`, closes the pipe: no failure of ours.
+            let _ = writeln!(std::io::stdout(), "{text}");
             ExitCode::SUCCESS
         }
         Ok(Request::Render(arguments)) => match run(&arguments) {
@@ -50,14 +52,21 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| format!("--threads {threads}: {error}"))?;
     }
     let start = Instant::now();
-    let (name, mut scene) = load(arguments.scene.as_deref())?;
-    for notice in default_view::complete(&mut scene) {
-        eprintln!("note: {notice}");
-    }
+    let (name, mut scene, warnings) = load(arguments.scene.as_deref())?;
+    let notices =
+        default_view::complete(&mut scene).map_err(|error| format!("{name}: {error}"))?;
     let camera = scene.cameras().get(arguments.camera).cloned().ok_or_else(|| {
         let count = scene.cameras().len();
         format!("{name}: there is no camera {}, the scene has {count}", arguments.camera)
     })?;
+    outputs::check(arguments)?;
+    // Only now, so that a failure is the one line that it says it is.
+    for warning in warnings {
+        eprintln!("warning: {name}: {warning}");
+    }
+    for notice in notices {
+        eprintln!("note: {notice}");
+    }
     let load_seconds = start.elapsed().as_secs_f64();
 
     let reporter = Reporter::new();
@@ -75,7 +84,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     reporter.finish();
 
     let start = Instant::now();
-    write(arguments, &picture)?;
+    outputs::write(arguments, &picture)?;
     let seconds = Seconds {
         load: load_seconds,
         build: caustics.seconds().build,
@@ -84,38 +93,19 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         write: start.elapsed().as_secs_f64(),
     };
     let report = Report::new(&name, arguments, &caustics, &picture, seconds);
-    print!("{report}");
     if let Some(path) = &arguments.stats {
         std::fs::write(path, report.to_json())
-            .map_err(|error| format!("{}: {error}", path.display()))?;
+            .map_err(|error| format!("{}: cannot write: {error}", path.display()))?;
     }
-    println!("wrote {}", arguments.out.display());
+    let _ = writeln!(std::io::stdout(), "{report}wrote {}", arguments.out.display());
     Ok(())
 }
 
-fn load(path: Option<&Path>) -> Result<(String, Scene), Failure> {
+fn load(path: Option<&Path>) -> Result<(String, Scene, Vec<gltf::Warning>), Failure> {
     let Some(path) = path else {
-        return Ok(("the built-in cognac glass".into(), builtin::cognac_glass()));
+        return Ok(("the built-in cognac glass".into(), builtin::cognac_glass(), Vec::new()));
     };
     let name = path.display().to_string();
     let loaded = gltf::load_path(path).map_err(|error| format!("{name}: {error}"))?;
-    for warning in &loaded.warnings {
-        eprintln!("warning: {name}: {warning}");
-    }
-    Ok((name, loaded.scene))
-}
-
-fn write(arguments: &Arguments, picture: &Picture) -> Result<(), Failure> {
-    let display = Display { exposure_ev: arguments.exposure, ..Display::default() };
-    write_png(&arguments.out, &picture.total(), &display).map_err(|error| error.to_string())?;
-    let exrs: [(&Option<_>, &Image); 2] = [
-        (&arguments.caustics_only, &picture.caustics),
-        (&arguments.direct_only, &picture.direct),
-    ];
-    for (path, image) in exrs {
-        if let Some(path) = path {
-            write_exr(path, image).map_err(|error| error.to_string())?;
-        }
-    }
-    Ok(())
+    Ok((name, loaded.scene, loaded.warnings))
 }

@@ -25,10 +25,12 @@
 //! | --- | --- |
 //! | [`oracles`] | the arrangements with their closed forms |
 //! | [`measure`] | flux of photons in regions, and its error against the oracle |
+//! | [`gallery`] | the glTF files of this package |
 //! | [`stage`] | the parts that the oracles' scenes have in common |
 //! | [`optics`] | Snell's and Fresnel's laws in f64 |
 //! | [`numerics`] | quadrature and roots in one dimension |
 
+pub mod gallery;
 pub mod measure;
 pub mod numerics;
 pub mod optics;

@@ -1,8 +1,9 @@
 //! Flux of photons in regions of a horizontal receiver, and its error against an oracle.
 
 use caustics_accel::BvhOptions;
-use caustics_scene::{Scene, SceneIntersector, World};
-use caustics_trace::{Photon, PhotonMap, TraceOptions, trace_photons};
+use caustics_sampling::Sequence;
+use caustics_scene::{Scene, World};
+use caustics_trace::{Branching, Photon, PhotonMap, TraceOptions, trace_photons};
 use glam::DVec2;
 
 use crate::TestError;
@@ -131,13 +132,26 @@ pub fn convergence(
     Ok(errors)
 }
 
+/// Options by which nothing but the points of the sequence decides about the flux: no roulette, and
+/// paths that end at the surface number `max_depth`.
+#[must_use]
+pub fn without_chance(sequence: Sequence, max_depth: u32) -> TraceOptions {
+    TraceOptions {
+        sequence,
+        max_depth,
+        branching: Branching::SplitAll,
+        min_weight: 0.0,
+        ..TraceOptions::default()
+    }
+}
+
 /// Traces the photons of a scene.
 ///
 /// # Errors
 /// If the scene cannot be traced.
 pub fn trace(scene: &Scene, options: &TraceOptions) -> Result<PhotonMap, TestError> {
     let world = World::new(scene)?;
-    let intersector = SceneIntersector::new(&world, &BvhOptions::default())?;
+    let intersector = world.intersector(&BvhOptions::default())?;
     Ok(trace_photons(&world, &intersector, options, &|_| {})?)
 }
 

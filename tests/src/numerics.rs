@@ -72,9 +72,9 @@ pub fn sign_changes(f: impl Fn(f64) -> f64, start: f64, end: f64, samples: usize
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
                 if (f(middle) > 0.0) == before {
-                    low = middle
+                    low = middle;
                 } else {
-                    high = middle
+                    high = middle;
                 }
             }
             roots.push(0.5 * (low + high));

@@ -2,8 +2,9 @@
 
 use caustics_accel::NearestScratch;
 use caustics_render::{NearestEstimate, NearestOptions};
+use caustics_sampling::Sequence;
 use caustics_tests::TestError;
-use caustics_tests::measure::{FluxProbes, Region, convergence, trace};
+use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_chance};
 use caustics_tests::oracles::MirrorCylinder;
 use caustics_trace::{Photon, TraceOptions};
 use glam::{DVec2, Vec3};
@@ -18,14 +19,6 @@ const RING: MirrorCylinder = MirrorCylinder {
 
 /// The ring is a prism; its sides are 5e-6 m inside the cylinder.
 const SEGMENTS: u32 = 1024;
-
-/// One reflection and the receiver: two surfaces.
-fn once() -> TraceOptions {
-    TraceOptions {
-        max_depth: 2,
-        ..TraceOptions::default()
-    }
-}
 
 /// Discs around the axis, one over the cusp, and a box beside it.
 fn probes(ring: &MirrorCylinder) -> FluxProbes {
@@ -59,7 +52,14 @@ fn reflected_inside(photons: &[Photon]) -> Vec<Photon> {
 fn flux_in_regions_converges() -> Result<(), TestError> {
     let scene = RING.scene(SEGMENTS)?;
     let counts = [1 << 12, 1 << 14, 1 << 16, 1 << 18];
-    let errors = convergence(&scene, &once(), 1, &probes(&RING), &counts, 0..4)?;
+    let errors = convergence(
+        &scene,
+        &without_chance(Sequence::Halton, 2),
+        1,
+        &probes(&RING),
+        &counts,
+        0..4,
+    )?;
     assert!(errors[3].error < 1.5e-3, "{errors:?}");
     assert!(errors[3].error < errors[0].error / 8.0, "{errors:?}");
     assert!(
@@ -70,10 +70,28 @@ fn flux_in_regions_converges() -> Result<(), TestError> {
 }
 
 #[test]
+fn a_grid_converges_as_well() -> Result<(), TestError> {
+    let (scene, options) = (RING.scene(SEGMENTS)?, without_chance(Sequence::Grid, 2));
+    let errors = convergence(
+        &scene,
+        &options,
+        1,
+        &probes(&RING),
+        &[1 << 12, 1 << 18],
+        1..5,
+    )?;
+    assert!(
+        errors[1].error < 2e-3 && errors[1].error < errors[0].error / 8.0,
+        "{errors:?}"
+    );
+    Ok(())
+}
+
+#[test]
 fn a_slightly_wrong_ring_is_told_apart() -> Result<(), TestError> {
     let options = TraceOptions {
         photons: 1 << 18,
-        ..once()
+        ..without_chance(Sequence::Halton, 2)
     };
     let map = trace(&RING.scene(SEGMENTS)?, &options)?;
     let photons = reflected_inside(&map.photons);
@@ -98,7 +116,7 @@ fn a_slightly_wrong_ring_is_told_apart() -> Result<(), TestError> {
 fn nearest_photons_give_the_irradiance() -> Result<(), TestError> {
     let options = TraceOptions {
         photons: 1 << 19,
-        ..once()
+        ..without_chance(Sequence::Halton, 2)
     };
     let map = trace(&RING.scene(SEGMENTS)?, &options)?;
     let photons = reflected_inside(&map.photons);

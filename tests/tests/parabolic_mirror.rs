@@ -1,7 +1,8 @@
 //! A piece of a parabolic mirror: flux in rectangles of the receiver against its closed form.
 
+use caustics_sampling::Sequence;
 use caustics_tests::TestError;
-use caustics_tests::measure::{FluxProbes, Region, convergence, trace};
+use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_chance};
 use caustics_tests::oracles::ParabolicMirror;
 use caustics_trace::TraceOptions;
 use glam::DVec2;
@@ -33,14 +34,35 @@ fn probes(mirror: &ParabolicMirror) -> FluxProbes {
 #[test]
 fn flux_in_rectangles_converges() -> Result<(), TestError> {
     let scene = MIRROR.scene(CELLS)?;
-    let options = TraceOptions {
-        max_depth: 2,
-        ..TraceOptions::default()
-    };
     let counts = [1 << 12, 1 << 15, 1 << 18];
-    let errors = convergence(&scene, &options, 1, &probes(&MIRROR), &counts, 0..4)?;
+    let errors = convergence(
+        &scene,
+        &without_chance(Sequence::Halton, 2),
+        1,
+        &probes(&MIRROR),
+        &counts,
+        0..4,
+    )?;
     assert!(errors[2].error < 2e-3, "{errors:?}");
     assert!(errors[2].error < errors[0].error / 8.0, "{errors:?}");
+    Ok(())
+}
+
+#[test]
+fn a_grid_converges_as_well() -> Result<(), TestError> {
+    let (scene, options) = (MIRROR.scene(CELLS)?, without_chance(Sequence::Grid, 2));
+    let errors = convergence(
+        &scene,
+        &options,
+        1,
+        &probes(&MIRROR),
+        &[1 << 12, 1 << 18],
+        1..5,
+    )?;
+    assert!(
+        errors[1].error < 2e-3 && errors[1].error < errors[0].error / 8.0,
+        "{errors:?}"
+    );
     Ok(())
 }
 
@@ -48,8 +70,7 @@ fn flux_in_rectangles_converges() -> Result<(), TestError> {
 fn a_slightly_wrong_mirror_is_told_apart() -> Result<(), TestError> {
     let options = TraceOptions {
         photons: 1 << 18,
-        max_depth: 2,
-        ..TraceOptions::default()
+        ..without_chance(Sequence::Halton, 2)
     };
     let map = trace(&MIRROR.scene(CELLS)?, &options)?;
     assert!(probes(&MIRROR).error(&map.photons) < 2e-3);

@@ -1,9 +1,10 @@
 //! A plano-convex lens of triangles: flux in discs against the map of one dimension.
 
+use caustics_sampling::Sequence;
 use caustics_tests::TestError;
-use caustics_tests::measure::{FluxProbes, Region, convergence, trace};
+use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_chance};
 use caustics_tests::oracles::{PlanoConvexLens, RadialLens};
-use caustics_trace::{Branching, TraceOptions};
+use caustics_trace::TraceOptions;
 use glam::DVec2;
 
 /// Half way to the focus, which is at 2.
@@ -14,14 +15,6 @@ const LENS: PlanoConvexLens = PlanoConvexLens {
     floor_distance: 0.9,
     irradiance: 2.0,
 };
-
-fn split() -> TraceOptions {
-    TraceOptions {
-        branching: Branching::SplitAll,
-        max_depth: 3,
-        ..TraceOptions::default()
-    }
-}
 
 fn probes(lens: &PlanoConvexLens) -> FluxProbes {
     let disc = |radius| {
@@ -40,9 +33,34 @@ fn probes(lens: &PlanoConvexLens) -> FluxProbes {
 fn flux_in_discs_converges() -> Result<(), TestError> {
     let scene = LENS.scene(128, 512)?;
     let counts = [1 << 12, 1 << 15, 1 << 18];
-    let errors = convergence(&scene, &split(), 2, &probes(&LENS), &counts, 0..4)?;
+    let errors = convergence(
+        &scene,
+        &without_chance(Sequence::Halton, 3),
+        2,
+        &probes(&LENS),
+        &counts,
+        0..4,
+    )?;
     assert!(errors[2].error < 2e-3, "{errors:?}");
     assert!(errors[2].error < errors[0].error / 8.0, "{errors:?}");
+    Ok(())
+}
+
+#[test]
+fn a_grid_converges_as_well() -> Result<(), TestError> {
+    let (scene, options) = (LENS.scene(128, 512)?, without_chance(Sequence::Grid, 3));
+    let errors = convergence(
+        &scene,
+        &options,
+        2,
+        &probes(&LENS),
+        &[1 << 12, 1 << 18],
+        1..5,
+    )?;
+    assert!(
+        errors[1].error < 2e-3 && errors[1].error < errors[0].error / 8.0,
+        "{errors:?}"
+    );
     Ok(())
 }
 
@@ -50,7 +68,7 @@ fn flux_in_discs_converges() -> Result<(), TestError> {
 fn a_slightly_wrong_lens_is_told_apart() -> Result<(), TestError> {
     let options = TraceOptions {
         photons: 1 << 18,
-        ..split()
+        ..without_chance(Sequence::Halton, 3)
     };
     let map = trace(&LENS.scene(128, 512)?, &options)?;
     let refracted = || map.photons.iter().filter(|photon| photon.events == 2);

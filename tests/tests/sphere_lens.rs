@@ -2,10 +2,11 @@
 
 use caustics_accel::NearestScratch;
 use caustics_render::{NearestEstimate, NearestOptions};
+use caustics_sampling::Sequence;
 use caustics_tests::TestError;
-use caustics_tests::measure::{FluxProbes, Region, convergence, trace};
+use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_chance};
 use caustics_tests::oracles::{RadialLens, SphereLens};
-use caustics_trace::{Branching, Photon, TraceOptions};
+use caustics_trace::{Photon, TraceOptions};
 use glam::{DVec2, Vec3};
 
 /// Nearer than the paraxial focus, at 1.5: three rays land inside a bright edge, one outside.
@@ -21,14 +22,6 @@ const CROSSED: SphereLens = SphereLens {
     floor_distance: 2.2,
     ..FOLDED
 };
-
-fn split() -> TraceOptions {
-    TraceOptions {
-        branching: Branching::SplitAll,
-        max_depth: 3,
-        ..TraceOptions::default()
-    }
-}
 
 fn discs(lens: &SphereLens, radii: &[f64]) -> FluxProbes {
     let disc = |&radius| {
@@ -52,7 +45,14 @@ fn flux_in_discs_converges() -> Result<(), TestError> {
         println!("{} below the centre", lens.floor_distance);
         let counts = [1 << 12, 1 << 14, 1 << 16, 1 << 18];
         let probes = discs(&lens, &radii);
-        let errors = convergence(&lens.scene()?, &split(), 2, &probes, &counts, 0..4)?;
+        let errors = convergence(
+            &lens.scene()?,
+            &without_chance(Sequence::Halton, 3),
+            2,
+            &probes,
+            &counts,
+            0..4,
+        )?;
         assert!(errors[3].error < 1e-3, "{errors:?}");
         assert!(errors[3].error < errors[0].error / 8.0, "{errors:?}");
         assert!(
@@ -69,7 +69,7 @@ fn a_slightly_wrong_ball_is_told_apart() -> Result<(), TestError> {
         &FOLDED.scene()?,
         &TraceOptions {
             photons: 1 << 18,
-            ..split()
+            ..without_chance(Sequence::Halton, 3)
         },
     )?;
     let refracted: Vec<Photon> = map
@@ -103,7 +103,7 @@ fn nearest_photons_give_the_irradiance() -> Result<(), TestError> {
             &lens.scene()?,
             &TraceOptions {
                 photons: 1 << 19,
-                ..split()
+                ..without_chance(Sequence::Halton, 3)
             },
         )?;
         let refracted: Vec<Photon> = map
@@ -113,7 +113,7 @@ fn nearest_photons_give_the_irradiance() -> Result<(), TestError> {
             .copied()
             .collect();
         let options = NearestOptions {
-            count: 200,
+            count: 400,
             ..NearestOptions::default()
         };
         let estimate = NearestEstimate::new(&refracted, &options)?;

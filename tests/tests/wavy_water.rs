@@ -1,10 +1,11 @@
 //! Waves over a receiver: flux in squares against the inverted map, and against its own density
 //! where it folds.
 
+use caustics_sampling::Sequence;
 use caustics_tests::TestError;
-use caustics_tests::measure::{FluxProbes, Region, convergence, trace};
+use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_chance};
 use caustics_tests::oracles::WavyWater;
-use caustics_trace::{Branching, TraceOptions};
+use caustics_trace::TraceOptions;
 use glam::DVec2;
 
 /// Half the width of the part of the receiver that is looked at, away from the surface's edges.
@@ -12,14 +13,6 @@ const HALF: f64 = 0.75;
 
 /// Squares that it is cut into, each way.
 const CELLS: usize = 12;
-
-fn split() -> TraceOptions {
-    TraceOptions {
-        branching: Branching::SplitAll,
-        max_depth: 2,
-        ..TraceOptions::default()
-    }
-}
 
 fn squares() -> impl Iterator<Item = (DVec2, DVec2)> {
     let width = 2.0 * HALF / CELLS as f64;
@@ -45,7 +38,14 @@ fn flux_in_squares_converges_without_folds() -> Result<(), TestError> {
     let water = WavyWater::with_strength(1.0);
     let scene = water.scene(512)?;
     let counts = [1 << 12, 1 << 14, 1 << 16, 1 << 18];
-    let errors = convergence(&scene, &split(), 1, &inverted(&water), &counts, 0..2)?;
+    let errors = convergence(
+        &scene,
+        &without_chance(Sequence::Halton, 2),
+        1,
+        &inverted(&water),
+        &counts,
+        0..2,
+    )?;
     assert!(errors[3].error < 1e-2, "{errors:?}");
     assert!(errors[3].error < errors[0].error / 8.0, "{errors:?}");
     assert!(
@@ -60,7 +60,14 @@ fn flux_in_squares_converges_with_folds() -> Result<(), TestError> {
     let water = WavyWater::with_strength(3.0);
     let scene = water.scene(512)?;
     let counts = [1 << 12, 1 << 15, 1 << 18];
-    let errors = convergence(&scene, &split(), 1, &binned(&water), &counts, 0..2)?;
+    let errors = convergence(
+        &scene,
+        &without_chance(Sequence::Halton, 2),
+        1,
+        &binned(&water),
+        &counts,
+        0..2,
+    )?;
     assert!(errors[2].error < 1.5e-2, "{errors:?}");
     assert!(errors[2].error < errors[0].error / 8.0, "{errors:?}");
     Ok(())
@@ -73,7 +80,7 @@ fn slightly_wrong_water_is_told_apart() -> Result<(), TestError> {
         &water.scene(512)?,
         &TraceOptions {
             photons: 1 << 18,
-            ..split()
+            ..without_chance(Sequence::Halton, 2)
         },
     )?;
     let right = inverted(&water).error(&map.photons);

@@ -10,7 +10,7 @@ use caustics_accel::{BvhOptions, Instructions, Intersect, TriangleBvh};
 use caustics_benches::{meshes, rays};
 use caustics_geometry::{Hit, Ray};
 
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 9;
 
 /// A way to trace a list of rays, which returns the number of hits.
 type Tracer<'a> = (&'static str, Box<dyn Fn(&[Ray]) -> usize + 'a>);
@@ -47,7 +47,7 @@ fn main() {
             caustics_benches::embree::Embree::new(&mesh, caustics_benches::embree::Mode::Robust),
         );
         for (kind, rays) in [("coherent", &coherent), ("incoherent", &incoherent)] {
-            let mut tracers: Vec<Tracer<'_>> = Vec::new();
+            let mut tracers: Vec<Tracer<'_>> = Vec::with_capacity(8);
             #[cfg(feature = "embree")]
             {
                 tracers.push((
@@ -76,6 +76,10 @@ fn main() {
                 "ours occluded",
                 Box::new(|rays| rays.iter().filter(|r| bvh.is_occluded(r)).count()),
             ));
+            tracers.push((
+                "ours streamed",
+                Box::new(|rays| count_all(rays, |r, h| bvh.closest_hits(r, h))),
+            ));
             let mut times = vec![Vec::new(); tracers.len()];
             let mut hits = vec![0; tracers.len()];
             for _ in 0..ROUNDS {
@@ -85,18 +89,18 @@ fn main() {
                     times[i].push(start.elapsed().as_secs_f64());
                 }
             }
-            let medians: Vec<f64> = times
+            let quartiles: Vec<f64> = times
                 .iter_mut()
                 .map(|times| {
                     times.sort_by(f64::total_cmp);
-                    times[times.len() / 2]
+                    times[times.len() / 4]
                 })
                 .collect();
             for (i, (name, _)) in tracers.iter().enumerate() {
-                let ratio = medians[0] / medians[i];
+                let ratio = quartiles[0] / quartiles[i];
                 println!(
                     "  {kind:10} {name:16} {:6.2} Mrays/s  {ratio:5.2}  {} hits",
-                    rays.len() as f64 / medians[i] / 1e6,
+                    rays.len() as f64 / quartiles[i] / 1e6,
                     hits[i]
                 );
                 match ratios.iter_mut().find(|r| r.0 == *name && r.1 == kind) {

@@ -11,7 +11,7 @@ const WIDEN: f32 = 1.0 + 8.0 * f32::EPSILON;
 ///
 /// It is built by one counting sort, several times faster than a tree: the choice where the
 /// photons change in every frame. Cells that follow each other along x are neighbours in memory,
-/// so that a search reads one stretch for each row of cells that it touches. 24 to 28 bytes a
+/// so that a search reads one stretch for each row of cells that it touches. 20 to 24 bytes a
 /// point, wherever in space the points lie.
 ///
 /// After Teschner et al., *Optimized Spatial Hashing for Collision Detection of Deformable
@@ -233,13 +233,13 @@ mod tests {
         let grid = HashGrid::new(&[[0.5, 0.5, 0.5]], 1.0).unwrap();
         let mut found = Vec::new();
         grid.within(Vec3::new(0.5, 0.5, -0.5), 1.0, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         grid.within(Vec3::new(0.5, 0.5, -0.5), 0.99, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         grid.within(Vec3::new(0.5, 0.5, 0.5), -1.0, |index, d2| {
-            found.push((index, d2))
+            found.push((index, d2));
         });
         assert_eq!(found, [(0, 1.0)]);
         let bad = [Vec3::ZERO, Vec3::NAN];

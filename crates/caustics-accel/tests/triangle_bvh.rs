@@ -1,5 +1,7 @@
 //! The triangle tree against a brute-force search in f64.
 
+mod common;
+
 use caustics_accel::{AccelError, BvhOptions, BvhPreset, Instructions, Intersect, TriangleBvh};
 use caustics_geometry::glam::{DVec3, Vec3};
 use caustics_geometry::{Hit, Ray};
@@ -233,6 +235,81 @@ proptest! {
     }
 }
 
+/// Rays from a small area through a fan of directions, many in one bundle, some along the axes.
+fn fans() -> impl Strategy<Value = (Vec<Vec3>, Vec<Vec3>)> {
+    let offset = prop::array::uniform3(-1.0_f32..1.0);
+    (
+        unit_coordinates(),
+        unit_coordinates(),
+        prop_oneof![Just(0.0_f32), Just(0.01), Just(0.05), Just(0.5)],
+        prop_oneof![Just(0.0_f32), Just(0.01)],
+        prop::array::uniform3(prop::bool::weighted(0.7)),
+        prop::collection::vec((offset.clone(), offset), 0..100),
+    )
+        .prop_map(|(from, to, fan, area, axes, offsets)| {
+            let axes = Vec3::from_array(axes.map(|kept| f32::from(u8::from(kept))));
+            let (from, to) = (Vec3::from_array(from), Vec3::from_array(to));
+            let direction = (to - from) * axes;
+            offsets
+                .into_iter()
+                .map(|(p, d)| {
+                    let d = Vec3::from_array(d) * axes * fan;
+                    (from + Vec3::from_array(p) * area, direction + d)
+                })
+                .unzip()
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn streams_find_what_single_rays_find(
+        (positions, triangles) in soup(),
+        (origins, directions) in fans(),
+        range in prop_oneof![Just((0.0_f32, f32::INFINITY)), Just((0.5_f32, 1.1_f32))],
+        options in options(),
+    ) {
+        let tree = TriangleBvh::new(&positions, &triangles, &options).unwrap();
+        let size = tree.bounds().diagonal().length().max(1e-3);
+        let middle = if tree.is_empty() { Vec3::ZERO } else { tree.bounds().center() };
+        let rays: Vec<Ray> = origins
+            .iter()
+            .zip(&directions)
+            .map(|(o, d)| Ray::with_range(middle + *o * size, *d * size, range.0, range.1))
+            .collect();
+        let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
+        let mut streamed = vec![None; rays.len()];
+        tree.closest_hits(&rays, &mut streamed);
+        prop_assert_eq!(single, streamed);
+    }
+}
+
+#[test]
+fn bundles_through_a_mesh_find_what_single_rays_find() {
+    let (positions, triangles) = common::icosphere(4, Vec3::ZERO);
+    let tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).unwrap();
+    let rays: Vec<Ray> = (0..10_000_u32)
+        .map(|i| {
+            let (x, y) = ((i % 100) as f32 / 80.0 - 0.7, (i / 100) as f32 / 80.0 - 0.6);
+            Ray::new(
+                Vec3::new(0.1, 0.2, 4.0),
+                Vec3::new(x, y, 0.3) - Vec3::new(0.1, 0.2, 4.0),
+            )
+        })
+        .collect();
+    let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
+    assert!(single.iter().flatten().count() > 5000);
+    let mut streamed = vec![None; rays.len()];
+    tree.closest_hits(&rays, &mut streamed);
+    assert_eq!(single, streamed);
+    // The shorter slice counts.
+    let mut few = vec![None; 21];
+    tree.closest_hits(&rays, &mut few);
+    assert_eq!(few, single[..21]);
+    tree.closest_hits(&rays[..3], &mut streamed);
+}
+
 #[test]
 fn empty_tree_is_never_hit() {
     let tree = TriangleBvh::new::<Vec3>(&[], &[], &BvhOptions::default()).unwrap();
@@ -424,4 +501,51 @@ fn distances_hold_from_tiny_to_huge() {
         let expected = f64::from(scale) / f64::from(direction.z);
         assert!((f64::from(hit.t) / expected - 1.0).abs() < 3e-7, "{scale}");
     }
+}
+
+#[test]
+fn refitted_trees_find_what_new_ones_find() {
+    let (positions, triangles) = common::icosphere(4, Vec3::ZERO);
+    let options = BvhOptions::default();
+    let mut tree = TriangleBvh::new(&positions, &triangles, &options).unwrap();
+    assert_eq!(tree.refit(&positions, &triangles), Ok(1.0));
+    let twisted: Vec<Vec3> = positions
+        .iter()
+        .map(|p| {
+            let (sin, cos) = (2.0 * p.y).sin_cos();
+            Vec3::new(cos * p.x - sin * p.z, 1.5 * p.y, sin * p.x + cos * p.z) + Vec3::X
+        })
+        .collect();
+    let worse = tree.refit(&twisted, &triangles).unwrap();
+    assert!(worse > 1.05 && worse < 5.0, "{worse}");
+    let fresh = TriangleBvh::new(&twisted, &triangles, &options).unwrap();
+    assert_eq!(tree.bounds(), fresh.bounds());
+    let mut found = 0;
+    for i in 0..5000_u32 {
+        let (a, b) = (i as f32 * 0.7, i as f32 * 0.1);
+        let origin = Vec3::new(a.sin(), b.cos(), (a + b).cos()) * 3.0;
+        let ray = Ray::new(origin, Vec3::new(1.0, 0.4 * b.sin(), 0.2) - origin);
+        assert_eq!(tree.closest_hit(&ray), fresh.closest_hit(&ray));
+        found += u32::from(fresh.is_occluded(&ray));
+    }
+    assert!(found > 2000);
+}
+
+#[test]
+fn refitting_refuses_another_mesh() {
+    let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let triangles = [[0, 1, 2], [0, 1, 1]];
+    let mut tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).unwrap();
+    assert_eq!(
+        tree.refit(&positions, &triangles[..1]),
+        Err(AccelError::TriangleCountChanged {
+            given: 1,
+            expected: 2
+        })
+    );
+    assert_eq!(
+        tree.refit(&positions, &[[0, 1, 2], [0, 1, 2]]),
+        Err(AccelError::TriangleAppeared { triangle: 1 })
+    );
+    assert!(tree.refit(&positions, &triangles).is_ok());
 }

@@ -1,6 +1,6 @@
 use std::f32::consts::FRAC_1_PI;
 
-use caustics_accel::{LeftBalancedTree, NearestScratch};
+use caustics_accel::{PhotonTree, NearestScratch};
 use caustics_filter::Kernel;
 use caustics_trace::Photon;
 use glam::Vec3;
@@ -42,7 +42,7 @@ impl Default for NearestOptions {
 #[derive(Clone, Debug)]
 pub struct NearestEstimate<'a> {
     photons: &'a [Photon],
-    tree: LeftBalancedTree,
+    tree: PhotonTree,
     count: usize,
     max_radius: f32,
     kernel: Kernel,
@@ -65,7 +65,7 @@ impl<'a> NearestEstimate<'a> {
         let positions: Vec<Vec3> = photons.iter().map(|photon| photon.position).collect();
         Ok(Self {
             photons,
-            tree: LeftBalancedTree::new(&positions)?,
+            tree: PhotonTree::new(&positions)?,
             count: options.count,
             max_radius,
             kernel: options.kernel,

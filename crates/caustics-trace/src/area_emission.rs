@@ -7,6 +7,14 @@ use glam::{Vec2, Vec3};
 
 use crate::emission::{Emission, EmissionSample, differential};
 
+/// How wide a photon's share is taken, of a four-dimensional cell that no other has.
+///
+/// A receiver sees two dimensions of the four: on it, as many photons overlap as there are places
+/// on the light, so that each may be narrower than the cell without leaving gaps. Of widths from
+/// 0.07 to 1, this one had the least error under a square lamp over a glass sphere, at 65,536
+/// photons (6 times less than the whole cell) and at 262,144 (7 times).
+pub(crate) const NARROWING: f32 = 0.2;
+
 /// The rays from one side of an emissive object, towards a sphere if one is given.
 ///
 /// Positions are uniform over the area. Directions fill the cone to the sphere evenly, or without
@@ -100,6 +108,6 @@ impl<'a> AreaDomain<'a> {
         // As if from so many places on the light, each with so many directions.
         let places = if balanced.is_finite() { balanced } else { share.sqrt().recip() };
         let places = places.clamp(1.0, share.recip());
-        [(area / places).sqrt(), (solid_angle * places * share).sqrt()]
+        [(area / places).sqrt(), (solid_angle * places * share).sqrt()].map(|it| NARROWING * it)
     }
 }

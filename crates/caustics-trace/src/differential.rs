@@ -21,7 +21,10 @@ pub struct RayDifferential<const N: usize = 2> {
 
 impl<const N: usize> RayDifferential<N> {
     /// The differential of a ray that does not depend on its parameters.
-    pub const ZERO: Self = Self { position: [Vec3::ZERO; N], direction: [Vec3::ZERO; N] };
+    pub const ZERO: Self = Self {
+        position: [Vec3::ZERO; N],
+        direction: [Vec3::ZERO; N],
+    };
 
     /// After travelling `distance` along the unit `direction` to a plane with normal
     /// `plane_normal`: each neighbour travels as far as it needs to reach the same plane
@@ -37,9 +40,16 @@ impl<const N: usize> RayDifferential<N> {
         let position = std::array::from_fn(|i| {
             let moved = self.position[i] + distance * self.direction[i];
             let corrected = moved - moved.dot(plane_normal) / along * direction;
-            if corrected.is_finite() { corrected } else { moved }
+            if corrected.is_finite() {
+                corrected
+            } else {
+                moved
+            }
         });
-        Self { position, direction: self.direction }
+        Self {
+            position,
+            direction: self.direction,
+        }
     }
 
     /// After mirror reflection of the unit `direction` at a unit `normal` that changes by
@@ -52,7 +62,10 @@ impl<const N: usize> RayDifferential<N> {
             let along_change = change.dot(normal) + direction.dot(bend);
             change - 2.0 * (along * bend + along_change * normal)
         });
-        Self { position: self.position, direction: directions }
+        Self {
+            position: self.position,
+            direction: directions,
+        }
     }
 
     /// After refraction of the unit `direction` to the unit `refracted` direction, at a unit
@@ -80,7 +93,10 @@ impl<const N: usize> RayDifferential<N> {
             let along_change = change.dot(normal) + direction.dot(bend);
             eta * change - (mu * bend + mu_slope * along_change * normal)
         });
-        Self { position: self.position, direction: directions }
+        Self {
+            position: self.position,
+            direction: directions,
+        }
     }
 
     /// The differential with the derivatives of the direction shortened to `limit` (a length, in
@@ -131,7 +147,10 @@ impl<const N: usize> RayDifferential<N> {
         }
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         // Scaled by the largest: its square overflows long before it does.
-        let scale = self.position.iter().fold(0.0f32, |a, it| a.max(it.abs().max_element()));
+        let scale = self
+            .position
+            .iter()
+            .fold(0.0f32, |a, it| a.max(it.abs().max_element()));
         if scale == 0.0 {
             return [Vec3::ZERO; 2];
         }
@@ -146,7 +165,10 @@ impl<const N: usize> RayDifferential<N> {
         let x = xx.sqrt();
         let shear = if x > 0.0 { xy / x } else { 0.0 };
         let y = (yy - shear * shear).max(0.0).sqrt();
-        [scale * (x * tangent + shear * bitangent), scale * y * bitangent]
+        [
+            scale * (x * tangent + shear * bitangent),
+            scale * y * bitangent,
+        ]
     }
 }
 
@@ -157,7 +179,10 @@ mod tests {
 
     /// Straight down, its neighbours fanning out along x by 1 a unit, and shifted along z.
     fn downwards() -> RayDifferential {
-        RayDifferential { position: [Vec3::ZERO, Vec3::Z], direction: [Vec3::X, Vec3::ZERO] }
+        RayDifferential {
+            position: [Vec3::ZERO, Vec3::Z],
+            direction: [Vec3::X, Vec3::ZERO],
+        }
     }
 
     #[test]
@@ -206,7 +231,11 @@ mod tests {
             ..RayDifferential::ZERO
         };
         let [one, other] = spread.footprint_axes(Vec3::Y);
-        let longest = if one.length() > other.length() { one } else { other };
+        let longest = if one.length() > other.length() {
+            one
+        } else {
+            other
+        };
         assert!(longest.abs().abs_diff_eq(5.0 * Vec3::X, 1e-5));
         assert_relative_eq!(one.cross(other).length(), 0.0, epsilon = 1e-4);
     }

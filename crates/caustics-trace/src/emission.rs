@@ -111,6 +111,14 @@ impl<'a> Emitter<'a> {
         if matches!(self.domain, Domain::Area(_)) { 4 } else { 2 }
     }
 
+    /// How many times as long along its first parameter the domain is as along its second.
+    pub(crate) fn aspect(&self) -> f32 {
+        match &self.domain {
+            Domain::Rectangle { edges: [along, across], .. } => along.length() / across.length(),
+            _ => 1.0,
+        }
+    }
+
     /// A point where its rays start, to find the media around it: `None` for a light that is
     /// infinitely far away.
     #[must_use]

@@ -75,6 +75,15 @@ impl LedgerEntry {
         self.count += other.count;
         self.flux += other.flux;
     }
+
+    fn retract(&mut self, other: &Self) {
+        self.count = self.count.saturating_sub(other.count);
+        self.flux -= other.flux;
+        if self.count == 0 {
+            // What rounding left of a difference of equal sums.
+            self.flux = DVec3::ZERO;
+        }
+    }
 }
 
 /// Where the energy went: every watt that the lights emit is booked once.
@@ -154,6 +163,20 @@ impl EnergyLedger {
     /// Books flux that a surviving path was given.
     pub fn gain(&mut self, flux: Vec3) {
         self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// Takes back another ledger's entries: its photons are to count as not emitted. Its rays stay
+    /// and are added: they were traced.
+    pub(crate) fn retract(&mut self, other: &Self) {
+        self.emitted.retract(&other.emitted);
+        self.roulette_gain -= other.roulette_gain;
+        for (mine, theirs) in self.fates.iter_mut().zip(&other.fates) {
+            mine.retract(theirs);
+        }
+        self.normal_fallbacks = self.normal_fallbacks.saturating_sub(other.normal_fallbacks);
+        self.bounded_differentials =
+            self.bounded_differentials.saturating_sub(other.bounded_differentials);
+        self.rays += other.rays;
     }
 
     /// Adds another ledger's lines to this one.

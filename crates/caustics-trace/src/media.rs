@@ -24,13 +24,46 @@ const AIR: f32 = 1.0;
 /// body of higher priority does not exist for light (Schmidt and Budge, *Simple Nested Dielectrics
 /// in Ray Traced Images*, Journal of Graphics Tools 2002). Of equal priorities the higher
 /// refractive index wins, so that glass displaces water without being told.
+///
+/// Eight bodies may enclose a point; of more, the outermost are forgotten.
+///
+/// ```
+/// use caustics_scene::{Instance, Material, Scene, Shape, World};
+/// use caustics_trace::{Crossing, MediumStack};
+/// # use caustics_trace::glam::Vec3;
+///
+/// let mut scene = Scene::new();
+/// for material in [Material::dielectric("glass", 1.5), Material::dielectric("water", 1.33)] {
+///     let material = scene.add_material(material)?;
+///     let ball = Shape::Sphere { center: Vec3::ZERO, radius: 1.0 };
+///     scene.add_instance(Instance::new("ball", ball, material))?;
+/// }
+/// let world = World::new(&scene)?;
+/// let (glass, water) = (0, 1);
+///
+/// // In the wall of the glass the surface of the water does not exist ...
+/// let wall = MediumStack::EMPTY.entered(glass);
+/// let both = wall.entered(water);
+/// assert_eq!(wall.cross(&world, water, true, None), Crossing::Through(both));
+/// // ... and light that leaves the wall there goes from glass to water.
+/// assert_eq!(
+///     both.cross(&world, glass, false, None),
+///     Crossing::Interface {
+///         index_from: 1.5,
+///         index_to: 1.33,
+///         beyond: MediumStack::EMPTY.entered(water),
+///     }
+/// );
+/// # Ok::<(), caustics_scene::SceneError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MediumStack {
     objects: [u32; CAPACITY],
     count: u8,
 }
 
-/// What a path finds at the boundary of a dielectric object.
+/// What a path finds at the boundary of a dielectric object. Refractive indices are those of the
+/// colour channel asked for, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Crossing {
     /// The boundary lies inside a body of higher priority: light goes straight on.
@@ -59,9 +92,17 @@ impl Medium {
     fn of(world: &World, object: u32) -> Option<Self> {
         let material = world.objects().get(object as usize)?.material;
         match world.materials().get(material as usize)?.surface {
-            Surface::Dielectric { ior, attenuation, dispersion, priority } => {
-                Some(Self { priority, ior, dispersion, attenuation })
-            }
+            Surface::Dielectric {
+                ior,
+                attenuation,
+                dispersion,
+                priority,
+            } => Some(Self {
+                priority,
+                ior,
+                dispersion,
+                attenuation,
+            }),
             _ => None,
         }
     }
@@ -83,12 +124,17 @@ impl Medium {
 
 impl MediumStack {
     /// Air alone.
-    pub const EMPTY: Self = Self { objects: [0; CAPACITY], count: 0 };
+    pub const EMPTY: Self = Self {
+        objects: [0; CAPACITY],
+        count: 0,
+    };
 
     /// The media around `point`, found by looking along one ray to the end of the world: the point
     /// lies inside each dielectric whose surface the ray first meets from within.
     ///
-    /// Lights and cameras may stand in water or glass; this is how their paths start.
+    /// Lights and cameras may stand in water or glass; this is how their paths start. The ray goes
+    /// up: below an open sheet of water there is water, however deep. It passes 256 surfaces at
+    /// most, and what it meets beyond is not found.
     #[must_use]
     pub fn at<I: Intersect + ?Sized>(world: &World, intersect: &I, point: Vec3) -> Self {
         let mut stack = Self::EMPTY;
@@ -107,7 +153,9 @@ impl MediumStack {
                     stack = stack.entered(surface.object);
                 }
             }
-            let origin = surface.spawn.origin_towards(surface.geometric_normal, PROBE_DIRECTION);
+            let origin = surface
+                .spawn
+                .origin_towards(surface.geometric_normal, PROBE_DIRECTION);
             ray = Ray::new(origin, PROBE_DIRECTION);
         }
         stack
@@ -147,11 +195,15 @@ impl MediumStack {
     /// The absorption coefficient of the medium that is here, per metre; zero in air.
     #[must_use]
     pub fn attenuation(&self, world: &World) -> Vec3 {
-        self.current(world).map_or(Vec3::ZERO, |medium| medium.attenuation)
+        self.current(world)
+            .map_or(Vec3::ZERO, |medium| medium.attenuation)
     }
 
     /// What a path with these media finds where it meets `object`, coming `from_outside` of it or
-    /// not, in one colour channel (0, 1, 2) or in all.
+    /// not, in one colour channel (0, 1, 2; more is taken as 2) or in all.
+    ///
+    /// `object` is an index into [`World::objects`]; one that is no dielectric has no boundary
+    /// here, and light goes straight on.
     #[must_use]
     pub fn cross(
         &self,
@@ -163,7 +215,11 @@ impl MediumStack {
         let Some(medium) = Medium::of(world, object) else {
             return Crossing::Through(*self);
         };
-        let beyond = if from_outside { self.entered(object) } else { self.left(object) };
+        let beyond = if from_outside {
+            self.entered(object)
+        } else {
+            self.left(object)
+        };
         // The media around the boundary, the object itself left out.
         let around = if from_outside { *self } else { beyond };
         let surrounding = around.current(world);
@@ -172,14 +228,22 @@ impl MediumStack {
         }
         let outside = surrounding.map_or(AIR, |other| other.index(channel));
         let inside = medium.index(channel);
-        let (index_from, index_to) =
-            if from_outside { (outside, inside) } else { (inside, outside) };
-        Crossing::Interface { index_from, index_to, beyond }
+        let (index_from, index_to) = if from_outside {
+            (outside, inside)
+        } else {
+            (inside, outside)
+        };
+        Crossing::Interface {
+            index_from,
+            index_to,
+            beyond,
+        }
     }
 
     fn current(&self, world: &World) -> Option<Medium> {
-        self.objects().iter().filter_map(|&object| Medium::of(world, object)).reduce(|a, b| {
-            if b.displaces(&a) { b } else { a }
-        })
+        self.objects()
+            .iter()
+            .filter_map(|&object| Medium::of(world, object))
+            .reduce(|a, b| if b.displaces(&a) { b } else { a })
     }
 }

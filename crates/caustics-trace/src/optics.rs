@@ -95,8 +95,11 @@ mod tests {
 
     #[test]
     fn fresnel_at_normal_incidence_is_the_closed_form() {
-        for (eta, expected) in [(1.0 / 1.5, 0.04), (1.5, 0.04), (1.0 / 2.4, (1.4f32 / 3.4).powi(2))]
-        {
+        for (eta, expected) in [
+            (1.0 / 1.5, 0.04),
+            (1.5, 0.04),
+            (1.0 / 2.4, (1.4f32 / 3.4).powi(2)),
+        ] {
             assert_relative_eq!(fresnel_dielectric(1.0, eta), expected, max_relative = 1e-5);
         }
     }
@@ -139,7 +142,11 @@ mod tests {
         let gold = Vec3::new(1.0, 0.76, 0.33);
         assert_eq!(fresnel_schlick(1.0, gold), gold);
         assert_relative_eq!(fresnel_schlick(0.0, gold).z, 1.0);
-        assert_relative_eq!(fresnel_schlick(0.5, gold).z, 0.33 + 0.67 / 32.0, max_relative = 1e-6);
+        assert_relative_eq!(
+            fresnel_schlick(0.5, gold).z,
+            0.33 + 0.67 / 32.0,
+            max_relative = 1e-6
+        );
     }
 
     #[test]
@@ -149,7 +156,10 @@ mod tests {
         assert_relative_eq!(left.x, 0.5, max_relative = 1e-6);
         assert_eq!(left.y, 1.0);
         assert_relative_eq!(left.z, 0.25, max_relative = 1e-6);
-        assert_eq!(beer_lambert(attenuation, f32::INFINITY), Vec3::new(0.0, 1.0, 0.0));
+        assert_eq!(
+            beer_lambert(attenuation, f32::INFINITY),
+            Vec3::new(0.0, 1.0, 0.0)
+        );
     }
 
     #[test]

@@ -49,6 +49,31 @@ pub struct TraceOptions {
     pub aim: Aim,
     /// The points that choose emission directions and positions.
     pub sequence: Sequence,
+    /// Where the lattice is made finer.
+    pub refinement: Refinement,
+}
+
+/// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
+///
+/// It needs [`Sequence::Grid`] and a light without area; other photons are emitted evenly. It pays
+/// where a caustic has hard edges against the dark (three times less error from the same photons
+/// inside a mirror ring), costs more rays where glass reflects light many times inside, and makes
+/// the photons depend on the scene, so that they jump when it moves: it is for still pictures, and
+/// off unless asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// How often a cell may be divided; 0 emits evenly.
+    pub levels: u32,
+    /// Footprints narrower than this are fine enough, and landing this close to where a neighbour's
+    /// differential says is close enough: in parts of the size of all specular objects together
+    /// (the diagonal of the box around them).
+    pub detail: f32,
+}
+
+impl Default for Refinement {
+    fn default() -> Self {
+        Self { levels: 0, detail: 1.0 / 1000.0 }
+    }
 }
 
 impl Default for TraceOptions {
@@ -61,6 +86,7 @@ impl Default for TraceOptions {
             min_weight: 0.03,
             aim: Aim::Casters,
             sequence: Sequence::Grid,
+            refinement: Refinement::default(),
         }
     }
 }
@@ -73,6 +99,9 @@ impl TraceOptions {
     pub fn validate(&self) -> Result<(), TraceError> {
         if !(0.0..=1.0).contains(&self.min_weight) {
             return Err(TraceError::MinWeight { min_weight: self.min_weight });
+        }
+        if !(self.refinement.detail >= 0.0 && self.refinement.detail.is_finite()) {
+            return Err(TraceError::Detail { detail: self.refinement.detail });
         }
         if self.max_depth < 2 {
             return Err(TraceError::MaxDepth { max_depth: self.max_depth });
@@ -90,6 +119,12 @@ pub enum TraceError {
     MinWeight {
         /// The threshold.
         min_weight: f32,
+    },
+    /// A detail that is no length.
+    #[error("the detail of refinement {detail} is not a finite number of at least 0")]
+    Detail {
+        /// The detail, in parts of the size of the specular objects.
+        detail: f32,
     },
     /// A depth at which no path reaches a receiver after a specular surface.
     #[error("the maximum depth {max_depth} is less than 2, so no caustic could be stored")]

@@ -73,14 +73,26 @@ pub fn scatter(
     channel: Option<u8>,
 ) -> Option<Scattering> {
     let side = if point.from_outside { 1.0 } else { -1.0 };
-    let normals = Normals::facing(side * point.geometric_normal, side * point.shading_normal, direction);
+    let normals = Normals::facing(
+        side * point.geometric_normal,
+        side * point.shading_normal,
+        direction,
+    );
     match world.materials()[point.material as usize].surface {
         Surface::Dielectric { .. } => {
             match media.cross(world, point.object, point.from_outside, channel) {
                 Crossing::Through(media) => Some(passage(direction, &normals, media)),
-                Crossing::Interface { index_from, index_to, beyond } => {
-                    Some(dielectric(direction, &normals, index_from / index_to, *media, beyond))
-                }
+                Crossing::Interface {
+                    index_from,
+                    index_to,
+                    beyond,
+                } => Some(dielectric(
+                    direction,
+                    &normals,
+                    index_from / index_to,
+                    *media,
+                    beyond,
+                )),
             }
         }
         Surface::Metal { f0 } => Some(metal(direction, &normals, f0, *media)),
@@ -98,16 +110,28 @@ struct Normals {
 impl Normals {
     fn facing(geometric: Vec3, shading: Vec3, direction: Vec3) -> Self {
         let interpolated = shading.dot(direction) < 0.0;
-        Self { geometric, serving: if interpolated { shading } else { geometric }, interpolated }
+        Self {
+            geometric,
+            serving: if interpolated { shading } else { geometric },
+            interpolated,
+        }
     }
 
     /// The reflected direction, the normal that it took, and whether that is the interpolated one.
     fn reflection(&self, direction: Vec3) -> (Vec3, Vec3, bool) {
         let reflected = reflect(direction, self.serving);
         if !self.interpolated || reflected.dot(self.geometric) > 0.0 {
-            (reflected.normalize_or_zero(), self.serving, self.interpolated)
+            (
+                reflected.normalize_or_zero(),
+                self.serving,
+                self.interpolated,
+            )
         } else {
-            (reflect(direction, self.geometric).normalize_or_zero(), self.geometric, false)
+            (
+                reflect(direction, self.geometric).normalize_or_zero(),
+                self.geometric,
+                false,
+            )
         }
     }
 
@@ -116,7 +140,11 @@ impl Normals {
         let by = |normal: Vec3, interpolated: bool| {
             refract(direction, normal, eta).map_or(
                 Refraction::Total { interpolated },
-                |refracted| Refraction::Transmitted { refracted, normal, interpolated },
+                |refracted| Refraction::Transmitted {
+                    refracted,
+                    normal,
+                    interpolated,
+                },
             )
         };
         match by(self.serving, self.interpolated) {
@@ -132,8 +160,14 @@ impl Normals {
 
 /// What the boundary of a dielectric lets through, and whether the interpolated normal said so.
 enum Refraction {
-    Transmitted { refracted: Vec3, normal: Vec3, interpolated: bool },
-    Total { interpolated: bool },
+    Transmitted {
+        refracted: Vec3,
+        normal: Vec3,
+        interpolated: bool,
+    },
+    Total {
+        interpolated: bool,
+    },
 }
 
 fn passage(direction: Vec3, normals: &Normals, media: MediumStack) -> Scattering {
@@ -146,7 +180,11 @@ fn passage(direction: Vec3, normals: &Normals, media: MediumStack) -> Scattering
         eta: 1.0,
         media,
     };
-    Scattering { outgoing: [Some(straight), None], absorbed: Vec3::ZERO, fallbacks: 0 }
+    Scattering {
+        outgoing: [Some(straight), None],
+        absorbed: Vec3::ZERO,
+        fallbacks: 0,
+    }
 }
 
 fn metal(direction: Vec3, normals: &Normals, f0: Vec3, media: MediumStack) -> Scattering {
@@ -177,7 +215,11 @@ fn dielectric(
 ) -> Scattering {
     let mut fallbacks = 0;
     let (reflectance, refracted) = match normals.refraction(direction, eta) {
-        Refraction::Transmitted { refracted, normal, interpolated } => {
+        Refraction::Transmitted {
+            refracted,
+            normal,
+            interpolated,
+        } => {
             fallbacks += u32::from(!interpolated);
             let reflectance = fresnel_dielectric(-direction.dot(normals.serving), eta);
             let refracted = Outgoing {
@@ -210,5 +252,9 @@ fn dielectric(
             media: before,
         }
     });
-    Scattering { outgoing: [reflected, refracted], absorbed: Vec3::ZERO, fallbacks }
+    Scattering {
+        outgoing: [reflected, refracted],
+        absorbed: Vec3::ZERO,
+        fallbacks,
+    }
 }

@@ -1,11 +1,12 @@
 use caustics_accel::Intersect;
-use caustics_sampling::{CounterRng, PointSet, apportion};
+use caustics_sampling::{CounterRng, PointSet, Sequence, apportion};
 use caustics_scene::World;
 
 use crate::emission::{EmissionSample, Emitter};
 use crate::media::MediumStack;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
+use crate::refine::trace_refined;
 use crate::tracer::PathTracer;
 
 /// Photons that one task traces: enough to share out, few enough to balance.
@@ -37,7 +38,13 @@ pub fn trace_photons<I: Intersect + ?Sized>(
             .map_or(MediumStack::EMPTY, |start| MediumStack::at(world, intersect, start));
         let batch = Batch { world, intersect, options, emitter, media, first, count };
         let before = map.ledger.emitted().flux;
-        if emitter.dimensions() == 2 {
+        if batch.is_refined() {
+            let levels = options.refinement.levels;
+            let detail = options.refinement.detail * world.specular_bounds().diagonal().length();
+            let mut refined = trace_refined(&batch, levels, detail, progress);
+            map.photons.append(&mut refined.photons);
+            map.ledger.merge(&refined.ledger);
+        } else if emitter.dimensions() == 2 {
             batch.trace::<2>(&mut map, progress);
         } else {
             batch.trace::<4>(&mut map, progress);
@@ -57,19 +64,27 @@ fn share(emitters: &[Emitter<'_>], total: u32) -> Vec<u32> {
 }
 
 /// The photons of one emitter.
-struct Batch<'a, I: ?Sized> {
-    world: &'a World,
-    intersect: &'a I,
-    options: &'a TraceOptions,
-    emitter: &'a Emitter<'a>,
+pub(crate) struct Batch<'a, I: ?Sized> {
+    pub(crate) world: &'a World,
+    pub(crate) intersect: &'a I,
+    pub(crate) options: &'a TraceOptions,
+    pub(crate) emitter: &'a Emitter<'a>,
     /// The media around the light.
-    media: MediumStack,
+    pub(crate) media: MediumStack,
     /// Number of its first photon among all.
-    first: u32,
-    count: u32,
+    pub(crate) first: u32,
+    pub(crate) count: u32,
 }
 
 impl<I: Intersect + ?Sized> Batch<'_, I> {
+    /// Whether its lattice is made finer where it must.
+    fn is_refined(&self) -> bool {
+        self.options.refinement.levels > 0
+            && self.options.sequence == Sequence::Grid
+            && self.emitter.dimensions() == 2
+            && self.count > 0
+    }
+
     fn trace<const N: usize>(&self, map: &mut PhotonMap, progress: &(dyn Fn(u32) + Sync)) {
         let chunks = self.count.div_ceil(CHUNK);
         let run = |chunk: u32| {

@@ -4,6 +4,7 @@ use caustics_sampling::CounterRng;
 use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
 
+use crate::area_emission::NARROWING;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
 use crate::ledger::{EnergyLedger, Fate};
@@ -15,6 +16,7 @@ use crate::scatter::{Event, Outgoing, Scattering, scatter};
 
 /// The longest change of direction, in radians for one sample spacing, that a differential keeps.
 /// Beyond it a first derivative says nothing about where the neighbour goes.
+/// It is less for lights with an area, by as much as their photons are narrowed.
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
 
 /// A path, or a branch of one, on its way to the next surface.
@@ -30,6 +32,8 @@ struct Branch<const N: usize> {
     events: u32,
     has_split: bool,
     channel: Option<u8>,
+    /// A hash of what the path met and did there.
+    path: u32,
 }
 
 /// Traces photons one at a time; holds the memory that they share.
@@ -39,10 +43,16 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     options: &'a TraceOptions,
     pending: Vec<Branch<N>>,
     pub(crate) photons: Vec<Photon>,
+    /// For each photon, a hash of what its path met and did there: photons of one path are parts of
+    /// one smooth sheet of light.
+    pub(crate) paths: Vec<u32>,
     pub(crate) ledger: EnergyLedger,
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
+    const DIRECTION_CHANGE_LIMIT: f32 =
+        if N > 2 { NARROWING * DIRECTION_CHANGE_LIMIT } else { DIRECTION_CHANGE_LIMIT };
+
     pub(crate) fn new(world: &'a World, intersect: &'a I, options: &'a TraceOptions) -> Self {
         Self {
             world,
@@ -50,6 +60,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             options,
             pending: Vec::new(),
             photons: Vec::new(),
+            paths: Vec::new(),
             ledger: EnergyLedger::default(),
         }
     }
@@ -67,6 +78,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: 0,
             has_split: false,
             channel: None,
+            path: 0,
         });
         while let Some(branch) = self.pending.pop() {
             self.advance(branch, threshold, rng);
@@ -150,6 +162,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             object: point.object,
             events: branch.events,
         });
+        self.paths.push(extended(branch.path, point.object, 0));
     }
 
     fn branch_out(
@@ -220,7 +233,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
         let differential = self.scattered(branch, point, outgoing).scaled(kept.powf(-1.0 / N as f32));
-        let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
+        let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let origin = point.spawn.origin_towards(point.geometric_normal, outgoing.direction);
         self.pending.push(Branch {
@@ -232,6 +245,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: branch.events + u32::from(outgoing.event != Event::Passage),
             has_split: branch.has_split || outgoing.weight.max_element() < 1.0,
             channel: branch.channel,
+            path: extended(branch.path, point.object, 1 + outgoing.event as u32),
         });
     }
 
@@ -262,4 +276,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             ),
         }
     }
+}
+
+/// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
+/// whole words).
+fn extended(path: u32, object: u32, event: u32) -> u32 {
+    let word = object.wrapping_mul(4).wrapping_add(event).wrapping_add(0x9E37_79B9);
+    (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
 }

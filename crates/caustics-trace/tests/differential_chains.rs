@@ -88,14 +88,16 @@ fn chain() -> impl Strategy<Value = ChainDraw> {
         prop::collection::vec(event(), 1..=6),
         (-1.0..0.5, 0.0..1.5, 0.0..TAU),
     )
-        .prop_map(|(log_scale, origin, start, changes, events, landing)| ChainDraw {
-            log_scale,
-            origin,
-            start,
-            changes,
-            events,
-            landing,
-        })
+        .prop_map(
+            |(log_scale, origin, start, changes, events, landing)| ChainDraw {
+                log_scale,
+                origin,
+                start,
+                changes,
+                events,
+                landing,
+            },
+        )
 }
 
 /// The shape of a draw, put where the ray from `origin` along `onwards` meets it at `angle`.
@@ -105,11 +107,17 @@ fn shape(draw: &EventDraw, scale: f64, origin: DVec3, onwards: DVec3) -> Option<
     let place = origin + distance * onwards;
     let normal = tilted(-onwards, draw.angle, draw.azimuth);
     match draw.kind {
-        0 => Plane::new(place.as_vec3(), normal.as_vec3()).ok().map(Shape::Plane),
+        0 => Plane::new(place.as_vec3(), normal.as_vec3())
+            .ok()
+            .map(Shape::Plane),
         1 | 2 => {
             // From within only where the ray starts within.
             let inside = draw.kind == 2 && distance < 1.9 * size * draw.angle.cos();
-            let center = if inside { place + size * normal } else { place - size * normal };
+            let center = if inside {
+                place + size * normal
+            } else {
+                place - size * normal
+            };
             let sphere = Sphere::new(center.as_vec3(), size as f32).ok()?;
             Some(Shape::Sphere { sphere, inside })
         }
@@ -119,7 +127,9 @@ fn shape(draw: &EventDraw, scale: f64, origin: DVec3, onwards: DVec3) -> Option<
             let (u, v) = draw.weights;
             let a = place - u * e1 - v * e2;
             let triangle = Triangle::new(a.as_vec3(), (a + e1).as_vec3(), (a + e2).as_vec3());
-            let normals = draw.bends.map(|(angle, azimuth)| tilted(normal, angle, azimuth).as_vec3());
+            let normals = draw
+                .bends
+                .map(|(angle, azimuth)| tilted(normal, angle, azimuth).as_vec3());
             Some(Shape::Triangle { triangle, normals })
         }
     }
@@ -157,7 +167,11 @@ fn build(draw: &ChainDraw) -> Option<Chain> {
         // Nothing is transmitted beyond the critical angle: such an event reflects.
         let refract = Change::Refract(event.eta as f32);
         let transmits = changed(refract, onwards, hit.shading).is_some();
-        let change = if event.refracts && transmits { refract } else { Change::Reflect };
+        let change = if event.refracts && transmits {
+            refract
+        } else {
+            Change::Reflect
+        };
         if !is_regular(change, onwards, &hit) {
             continue;
         }
@@ -180,9 +194,14 @@ fn build(draw: &ChainDraw) -> Option<Chain> {
 fn well_conditioned(chain: &Chain) -> Option<[PointAndDirection; 2]> {
     let exact = chain.exact(Jitter::NONE)?;
     let steady = (1..=6u64).all(|seed| {
-        chain.exact(Jitter { seed, relative: JITTER }).is_some_and(|moved| {
-            (0..2).all(|i| moved[i].relative_difference(&exact[i]) < 0.1 * TOLERANCE)
-        })
+        chain
+            .exact(Jitter {
+                seed,
+                relative: JITTER,
+            })
+            .is_some_and(|moved| {
+                (0..2).all(|i| moved[i].relative_difference(&exact[i]) < 0.1 * TOLERANCE)
+            })
     });
     steady.then_some(exact)
 }
@@ -222,16 +241,30 @@ fn chains_agree_with_central_differences() {
         prop_assert!(error < TOLERANCE, "off by {error:e}: {chain:?}");
         Ok(())
     });
-    let counts = tally.each_ref().map(|[kept, skipped]| (kept.get(), skipped.get()));
-    println!("kept and skipped by events: {counts:?}, worst error {:e}", worst.get());
+    let counts = tally
+        .each_ref()
+        .map(|[kept, skipped]| (kept.get(), skipped.get()));
+    println!(
+        "kept and skipped by events: {counts:?}, worst error {:e}",
+        worst.get()
+    );
     if let Err(failure) = outcome {
         panic!("{failure}");
     }
-    let (kept, skipped) = counts.iter().fold((0, 0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
-    assert!(kept > 2 * skipped, "only {kept} of {} chains are well conditioned", kept + skipped);
+    let (kept, skipped) = counts
+        .iter()
+        .fold((0, 0), |sum, it| (sum.0 + it.0, sum.1 + it.1));
+    assert!(
+        kept > 2 * skipped,
+        "only {kept} of {} chains are well conditioned",
+        kept + skipped
+    );
     // Three in four of all chains are kept, and half of those with six events.
     let (kept, skipped) = counts[6];
-    assert!(2 * kept > skipped, "of six events: {kept} kept, {skipped} skipped");
+    assert!(
+        2 * kept > skipped,
+        "of six events: {kept} kept, {skipped} skipped"
+    );
 }
 
 /// A comparison that accepts a wrong derivative proves nothing.
@@ -243,7 +276,9 @@ fn wrong_derivatives_are_rejected() {
             (|(_, change)| matches!(change, Change::Refract(eta) if (eta - 1.0).abs() > 0.05))
                 as fn(&(Shape, Change)) -> bool,
         ),
-        (Operations::WithoutNormalChange, |(shape, _)| !matches!(shape, Shape::Plane(_))),
+        (Operations::WithoutNormalChange, |(shape, _)| {
+            !matches!(shape, Shape::Plane(_))
+        }),
         (Operations::WithoutDistanceChange, |_| true),
     ] {
         let (rejected, accepted) = (Cell::new(0u32), Cell::new(0u32));
@@ -266,7 +301,11 @@ fn wrong_derivatives_are_rejected() {
         if let Err(failure) = outcome {
             panic!("{failure}");
         }
-        println!("{operations:?}: {} rejected, {} accepted", rejected.get(), accepted.get());
+        println!(
+            "{operations:?}: {} rejected, {} accepted",
+            rejected.get(),
+            accepted.get()
+        );
         assert!(rejected.get() > 100, "{operations:?} was hardly tried");
         // Light that comes straight on, or through almost nothing, hides a missing term.
         assert!(

@@ -27,12 +27,22 @@ fn vector() -> impl Strategy<Value = Vec3> {
 }
 
 fn differential() -> impl Strategy<Value = RayDifferential<2>> {
-    (prop::array::uniform2(vector()), prop::array::uniform2(vector()))
-        .prop_map(|(position, direction)| RayDifferential { position, direction })
+    (
+        prop::array::uniform2(vector()),
+        prop::array::uniform2(vector()),
+    )
+        .prop_map(|(position, direction)| RayDifferential {
+            position,
+            direction,
+        })
 }
 
 fn is_finite<const N: usize>(differential: &RayDifferential<N>) -> bool {
-    differential.position.iter().chain(&differential.direction).all(|it| it.is_finite())
+    differential
+        .position
+        .iter()
+        .chain(&differential.direction)
+        .all(|it| it.is_finite())
 }
 
 /// What [`RayDifferential::bounded`] promises about its result.
@@ -53,10 +63,14 @@ fn check_bounds(before: &RayDifferential<2>, limit: f32) -> Result<(), TestCaseE
         }
     }
     // At the limit itself either answer is right.
-    let near = before.direction.iter().any(|it| {
-        (it.as_dvec3().length() / f64::from(limit) - 1.0).abs() <= 2e-6
-    });
-    prop_assert!(shortened == too_long || near, "shortened {shortened}, too long {too_long}");
+    let near = before
+        .direction
+        .iter()
+        .any(|it| (it.as_dvec3().length() / f64::from(limit) - 1.0).abs() <= 2e-6);
+    prop_assert!(
+        shortened == too_long || near,
+        "shortened {shortened}, too long {too_long}"
+    );
     Ok(())
 }
 
@@ -173,9 +187,12 @@ fn the_derivative_diverges_as_it_should() {
         let (side, _) = onwards.any_orthonormal_pair();
         let across = onwards.cross(Vec3::Y).normalize();
         let in_plane = (side - side.dot(across) * across).normalize();
-        RayDifferential::<1> { position: [Vec3::ZERO], direction: [in_plane] }
-            .refracted(onwards, refracted, Vec3::Y, eta, [Vec3::ZERO])
-            .direction[0]
+        RayDifferential::<1> {
+            position: [Vec3::ZERO],
+            direction: [in_plane],
+        }
+        .refracted(onwards, refracted, Vec3::Y, eta, [Vec3::ZERO])
+        .direction[0]
             .length()
     };
     for offset in [1e-2, 1e-3, 1e-4] {

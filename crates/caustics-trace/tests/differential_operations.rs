@@ -32,7 +32,10 @@ fn event() -> impl Strategy<Value = Event> {
     (-1.0..1.0, 0.0..TAU, 0.0..steepest, 0.0..TAU).prop_map(|(cosine, azimuth, angle, around)| {
         let onwards = direction(cosine, azimuth);
         let normal = tilted(-onwards, angle, around).as_vec3();
-        Event { direction: onwards.as_vec3(), normal }
+        Event {
+            direction: onwards.as_vec3(),
+            normal,
+        }
     })
 }
 
@@ -56,7 +59,10 @@ fn determined(result: DVec3, summands: &[f64]) -> bool {
 
 /// A differential with the same derivatives in every parameter.
 fn differential(position: Vec3, direction: Vec3) -> RayDifferential<1> {
-    RayDifferential { position: [position], direction: [direction] }
+    RayDifferential {
+        position: [position],
+        direction: [direction],
+    }
 }
 
 /// The exact derivative of the direction after an event at a normal with a given derivative.
@@ -71,7 +77,10 @@ fn exact_event(
         let direction = neighbour(event.direction, direction_change, step).normalize();
         let normal = neighbour(event.normal, normal_change, step).normalize();
         let direction = changed(change, direction, normal)?;
-        Some(PointAndDirection { position: DVec3::ZERO, direction })
+        Some(PointAndDirection {
+            position: DVec3::ZERO,
+            direction,
+        })
     })
     .map(|exact| exact.direction)
 }

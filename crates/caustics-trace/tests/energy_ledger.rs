@@ -6,7 +6,7 @@ use caustics_geometry::shapes::quad;
 use caustics_sampling::Sequence;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{DVec3, Vec3};
-use caustics_trace::{Aim, Branching, Fate, TraceOptions, trace_photons};
+use caustics_trace::{Aim, Branching, Refinement, Fate, TraceOptions, trace_photons};
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
 
@@ -60,7 +60,9 @@ fn add_lamp(scene: &mut Scene, lamp: &Lamp, colour: [f32; 3]) {
             return;
         }
     };
-    scene.add_light(light.expect("a valid light")).expect("a valid light");
+    scene
+        .add_light(light.expect("a valid light"))
+        .expect("a valid light");
 }
 
 proptest! {
@@ -104,6 +106,7 @@ proptest! {
                     let min_weight = if branching == Branching::SplitAll { 1e-2 } else { 1e-3 };
                     let options = TraceOptions {
                         photons: 500, seed, max_depth, branching, min_weight, aim, sequence,
+                        refinement: Refinement { levels: (seed % 3) as u32, ..Refinement::default() },
                     };
                     let map = trace_photons(&world, &intersector, &options, &|_| {});
                     let map = map.expect("valid options");
@@ -142,10 +145,18 @@ proptest! {
 fn a_missing_entry_shows() {
     let mut scene = Scene::new();
     add_floor(&mut scene, -2.0, 4.0);
-    add_sphere(&mut scene, Vec3::ZERO, 0.5, Material::dielectric("glass", 1.5));
+    add_sphere(
+        &mut scene,
+        Vec3::ZERO,
+        0.5,
+        Material::dielectric("glass", 1.5),
+    );
     add_lamp(&mut scene, &Lamp::Point, [1.0; 3]);
     let (world, intersector) = flattened(&scene);
-    let options = TraceOptions { photons: 1000, ..TraceOptions::default() };
+    let options = TraceOptions {
+        photons: 1000,
+        ..TraceOptions::default()
+    };
     let map = trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options");
     assert!(map.ledger.imbalance() < 1e-6);
     let mut ledger = map.ledger.clone();

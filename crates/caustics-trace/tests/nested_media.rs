@@ -21,14 +21,20 @@ fn nested(materials: impl IntoIterator<Item = Material>) -> World {
 }
 
 fn stack(objects: &[u32]) -> MediumStack {
-    objects.iter().fold(MediumStack::EMPTY, |stack, &object| stack.entered(object))
+    objects
+        .iter()
+        .fold(MediumStack::EMPTY, |stack, &object| stack.entered(object))
 }
 
 /// The indices on both sides, or `None` where light goes straight on.
 fn interface(world: &World, media: &MediumStack, object: u32, outside: bool) -> Option<[f32; 2]> {
     match media.cross(world, object, outside, None) {
         Crossing::Through(_) => None,
-        Crossing::Interface { index_from, index_to, .. } => Some([index_from, index_to]),
+        Crossing::Interface {
+            index_from,
+            index_to,
+            ..
+        } => Some([index_from, index_to]),
     }
 }
 
@@ -40,7 +46,10 @@ fn the_higher_priority_is_there() {
     let world = nested([glass, oil]);
     assert_eq!(interface(&world, &stack(&[0]), 1, true), None);
     assert_eq!(interface(&world, &stack(&[0, 1]), 1, false), None);
-    assert_eq!(interface(&world, &stack(&[0, 1]), 0, false), Some([1.5, 1.6]));
+    assert_eq!(
+        interface(&world, &stack(&[0, 1]), 0, false),
+        Some([1.5, 1.6])
+    );
     assert_eq!(interface(&world, &stack(&[1]), 0, true), Some([1.6, 1.5]));
     assert_eq!(stack(&[0, 1]).attenuation(&world), Vec3::ZERO);
     assert_eq!(stack(&[1]).attenuation(&world), Vec3::splat(7.0));
@@ -49,22 +58,37 @@ fn the_higher_priority_is_there() {
 
 #[test]
 fn of_equal_priorities_the_denser_is_there() {
-    let world = nested([Material::dielectric("glass", 1.5), Material::dielectric("water", 1.33)]);
+    let world = nested([
+        Material::dielectric("glass", 1.5),
+        Material::dielectric("water", 1.33),
+    ]);
     assert_eq!(interface(&world, &stack(&[0]), 1, true), None);
     assert_eq!(interface(&world, &stack(&[1]), 0, true), Some([1.33, 1.5]));
-    assert_eq!(interface(&world, &stack(&[1, 0]), 0, false), Some([1.5, 1.33]));
+    assert_eq!(
+        interface(&world, &stack(&[1, 0]), 0, false),
+        Some([1.5, 1.33])
+    );
     // Where both are the same there is a boundary, but one that does nothing.
-    let twins = nested([Material::dielectric("ice", 1.31), Material::dielectric("ice", 1.31)]);
+    let twins = nested([
+        Material::dielectric("ice", 1.31),
+        Material::dielectric("ice", 1.31),
+    ]);
     assert_eq!(interface(&twins, &stack(&[0]), 1, true), Some([1.31, 1.31]));
 }
 
 #[test]
 fn leaving_what_was_never_entered_changes_nothing() {
-    let world = nested([Material::dielectric("glass", 1.5), Material::dielectric("water", 1.33)]);
+    let world = nested([
+        Material::dielectric("glass", 1.5),
+        Material::dielectric("water", 1.33),
+    ]);
     assert_eq!(MediumStack::EMPTY.left(0), MediumStack::EMPTY);
     assert_eq!(stack(&[1]).left(0), stack(&[1]));
     // It is refracted as if the path had been inside.
-    assert_eq!(interface(&world, &MediumStack::EMPTY, 0, false), Some([1.5, 1.0]));
+    assert_eq!(
+        interface(&world, &MediumStack::EMPTY, 0, false),
+        Some([1.5, 1.0])
+    );
     let Crossing::Interface { beyond, .. } = stack(&[1]).cross(&world, 0, false, None) else {
         panic!("an interface");
     };
@@ -162,18 +186,37 @@ proptest! {
 fn a_path_may_start_inside() {
     // A tumbler with a thick bottom; the water reaches a little into its wall.
     let mut scene = Scene::new();
-    let profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 3.0), (0.8, 3.0), (0.8, 0.4), (0.0, 0.4)];
+    let profile = [
+        (0.0, 0.0),
+        (1.0, 0.0),
+        (1.0, 3.0),
+        (0.8, 3.0),
+        (0.8, 0.4),
+        (0.0, 0.4),
+    ];
     let profile = profile.map(|(x, y)| Vec2::new(x, y));
     let glass = revolution(&profile, &RevolutionOptions::default()).expect("a valid profile");
     let profile = [(0.0, 0.3), (0.9, 0.3), (0.9, 2.0), (0.0, 2.0)].map(|(x, y)| Vec2::new(x, y));
     let water = revolution(&profile, &RevolutionOptions::default()).expect("a valid profile");
     assert!(glass.signed_volume() > 0.0 && water.signed_volume() > 0.0);
     add_floor(&mut scene, -1.0, 10.0);
-    add_mesh(&mut scene, "glass", glass, Material::dielectric("glass", 1.5).with_priority(1));
-    add_mesh(&mut scene, "water", water, Material::dielectric("water", 1.33));
+    add_mesh(
+        &mut scene,
+        "glass",
+        glass,
+        Material::dielectric("glass", 1.5).with_priority(1),
+    );
+    add_mesh(
+        &mut scene,
+        "water",
+        water,
+        Material::dielectric("water", 1.33),
+    );
     let (world, intersector) = flattened(&scene);
     let media = |x: f32, y: f32| {
-        let mut objects = MediumStack::at(&world, &intersector, Vec3::new(x, y, 0.1)).objects().to_vec();
+        let mut objects = MediumStack::at(&world, &intersector, Vec3::new(x, y, 0.1))
+            .objects()
+            .to_vec();
         objects.sort_unstable();
         objects
     };
@@ -181,7 +224,11 @@ fn a_path_may_start_inside() {
     assert_eq!(media(0.1, 2.5), [0u32; 0], "in the air over it");
     assert_eq!(media(0.95, 1.0), [1], "in the wall");
     assert_eq!(media(0.85, 1.0), [1, 2], "where both overlap");
-    assert_eq!(media(0.1, 0.35), [1, 2], "in the bottom, where both overlap");
+    assert_eq!(
+        media(0.1, 0.35),
+        [1, 2],
+        "in the bottom, where both overlap"
+    );
     assert_eq!(media(0.1, 0.1), [1], "in the bottom");
     assert_eq!(media(3.0, 1.0), [0u32; 0], "beside it");
     assert_eq!(media(0.1, -0.5), [0u32; 0], "under it");
@@ -192,7 +239,12 @@ fn a_sheet_of_water_is_bottomless() {
     let mut scene = Scene::new();
     add_floor(&mut scene, -2.0, 20.0);
     let waves = heightfield([40.0, 40.0], [20, 20], |x, z| 0.1 * (x + 0.5 * z).sin());
-    add_mesh(&mut scene, "sea", waves.expect("a valid sheet"), Material::dielectric("water", 1.33));
+    add_mesh(
+        &mut scene,
+        "sea",
+        waves.expect("a valid sheet"),
+        Material::dielectric("water", 1.33),
+    );
     let (world, intersector) = flattened(&scene);
     let at = |y: f32| MediumStack::at(&world, &intersector, Vec3::new(0.3, y, 0.2));
     assert_eq!(at(-1.0).objects(), [1]);
@@ -209,7 +261,13 @@ fn layers(glass_priority: i32) -> Scene {
     add_floor(&mut scene, -2.0, 30.0);
     add_box(&mut scene, "glass", wide, deep + Vec3::Y, glass);
     let water = Material::dielectric("water", 1.33);
-    add_box(&mut scene, "water", wide - Vec3::Y, deep + 0.25 * Vec3::Y, water);
+    add_box(
+        &mut scene,
+        "water",
+        wide - Vec3::Y,
+        deep + 0.25 * Vec3::Y,
+        water,
+    );
     scene
 }
 
@@ -243,21 +301,41 @@ fn liquid_that_reaches_into_its_glass_refracts_with_the_ratio_of_both() {
             let light = single_ray(Vec3::new(0.0, 2.0, 0.0), onwards, 1e-3);
             let map = trace_one(&scene, &intersector, light);
             // Three refractions and nothing else: the branch that is never reflected.
-            let direct: Vec<_> = map.photons.iter().filter(|photon| photon.events == 3).collect();
+            let direct: Vec<_> = map
+                .photons
+                .iter()
+                .filter(|photon| photon.events == 3)
+                .collect();
             assert_eq!(direct.len(), 1, "at {degrees} degrees");
-            let layers = [(1.0, 1.0), (1.5, 1.0 - boundary), (1.33, 1.0 + boundary), (1.0, 1.0)];
+            let layers = [
+                (1.0, 1.0),
+                (1.5, 1.0 - boundary),
+                (1.33, 1.0 + boundary),
+                (1.0, 1.0),
+            ];
             let (offset, left) = through_layers(angle, &layers);
             let error = f64::from(direct[0].position.x) - offset;
             // Spawned rays step off along the normal, by some 10⁻⁶ of the layers' 20 m.
             let tolerance = 1e-6 * (1.0 + offset) + 5e-5 * angle.tan();
-            assert!(error.abs() < tolerance, "priority {priority}, {degrees}: {error}");
+            assert!(
+                error.abs() < tolerance,
+                "priority {priority}, {degrees}: {error}"
+            );
             let unaimed = map.ledger.entry(Fate::Unaimed).flux.x;
             let emitted = map.ledger.emitted().flux.x - unaimed;
             let error = f64::from(direct[0].flux.x) / emitted - left;
-            assert!(error.abs() < 1e-5, "priority {priority}, {degrees} degrees: {error:e}");
+            assert!(
+                error.abs() < 1e-5,
+                "priority {priority}, {degrees} degrees: {error:e}"
+            );
             assert!(map.ledger.imbalance() < 1e-6);
             // The control: with the boundary at the water's own top, or seen from air.
-            let swapped = [(1.0, 1.0), (1.5, 0.75 + boundary), (1.33, 1.25 - boundary), (1.0, 1.0)];
+            let swapped = [
+                (1.0, 1.0),
+                (1.5, 0.75 + boundary),
+                (1.33, 1.25 - boundary),
+                (1.0, 1.0),
+            ];
             let (wrong, _) = through_layers(angle, &swapped);
             assert!(degrees == 0.0 || (wrong - offset).abs() > 1e-3 * offset);
         }

@@ -25,7 +25,14 @@ fn world(ior: f32, base: [f32; 3]) -> World {
     {
         let material = scene.add_material(material).expect("valid materials");
         let center = Vec3::new(3.0 * place as f32, 0.0, 0.0);
-        let instance = Instance::new("ball", Shape::Sphere { center, radius: 1.0 }, material);
+        let instance = Instance::new(
+            "ball",
+            Shape::Sphere {
+                center,
+                radius: 1.0,
+            },
+            material,
+        );
         scene.add_instance(instance).expect("valid spheres");
     }
     World::new(&scene).expect("a small world")

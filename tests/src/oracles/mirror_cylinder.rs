@@ -48,13 +48,15 @@ impl MirrorCylinder {
     pub fn irradiance_at(&self, point: DVec2) -> f64 {
         // The point is on the line of the reflected light where their cross product is 0.
         let aside = |phi: f64| {
-            self.from_wall(phi, point)
+            self.towards_wall(phi, point)
                 .perp_dot(DVec2::from_angle(2.0 * phi))
         };
         sign_changes(aside, -FRAC_PI_2, FRAC_PI_2, 20_000)
             .into_iter()
             .map(|phi| {
-                let length = self.from_wall(phi, point).dot(DVec2::from_angle(2.0 * phi));
+                let length = self
+                    .towards_wall(phi, point)
+                    .dot(DVec2::from_angle(2.0 * phi));
                 let (low, high) = self.lit_lengths(phi);
                 if (low..=high).contains(&length) {
                     let width = self.radius * phi.cos();
@@ -146,7 +148,7 @@ impl MirrorCylinder {
         }
     }
 
-    fn from_wall(&self, phi: f64, point: DVec2) -> DVec2 {
+    fn towards_wall(&self, phi: f64, point: DVec2) -> DVec2 {
         self.radius * DVec2::from_angle(phi) - point
     }
 }

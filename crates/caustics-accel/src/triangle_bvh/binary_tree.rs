@@ -12,6 +12,8 @@ use super::BvhPreset;
 /// A binary tree whose leaves hold one triangle each; the root comes first.
 pub(super) struct BinaryTree {
     pub(super) nodes: Vec<BinaryNode>,
+    /// The nodes' indices, children after their parents, each subtree in one piece.
+    pub(super) order: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -91,31 +93,28 @@ impl BinaryTree {
                 is_leaf,
             }
         });
-        let mut tree = Self {
-            nodes: nodes.collect(),
-        };
+        let mut tree = Self::new(nodes.collect());
         tree.refit();
         tree
     }
 
-    /// The nodes' indices, children after their parents, each subtree in one piece.
-    pub(super) fn order(&self) -> Vec<u32> {
-        let mut order = Vec::with_capacity(self.nodes.len());
+    fn new(nodes: Vec<BinaryNode>) -> Self {
+        let mut order = Vec::with_capacity(nodes.len());
         let mut waiting = Vec::new();
-        waiting.extend((!self.nodes.is_empty()).then_some(0));
+        waiting.extend((!nodes.is_empty()).then_some(0));
         while let Some(index) = waiting.pop() {
             order.push(index);
-            let node = &self.nodes[index as usize];
+            let node = &nodes[index as usize];
             if !node.is_leaf {
                 waiting.extend([node.first + 1, node.first]);
             }
         }
-        order
+        Self { nodes, order }
     }
 
     /// Computes the inner nodes' boxes from those of the leaves.
     fn refit(&mut self) {
-        for index in self.order().into_iter().rev() {
+        for &index in self.order.iter().rev() {
             let node = self.nodes[index as usize];
             if !node.is_leaf {
                 let left = self.nodes[node.first as usize];
@@ -139,7 +138,7 @@ impl BinaryTree {
         };
         let mut nodes = Vec::with_capacity(2 * boxes.len());
         if boxes.is_empty() {
-            return Self { nodes };
+            return Self::new(nodes);
         }
         nodes.push(placeholder);
         let mut waiting = vec![(0, 0, boxes.len())];
@@ -177,6 +176,6 @@ impl BinaryTree {
                 nodes.extend([placeholder; 2]);
             }
         }
-        Self { nodes }
+        Self::new(nodes)
     }
 }

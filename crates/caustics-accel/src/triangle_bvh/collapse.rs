@@ -63,7 +63,7 @@ impl Costs {
 fn evaluate(tree: &BinaryTree) -> Vec<Costs> {
     let nodes = &tree.nodes;
     let mut costs = vec![Costs::UNKNOWN; nodes.len()];
-    for index in tree.order().into_iter().rev() {
+    for &index in tree.order.iter().rev() {
         let node = &nodes[index as usize];
         let half_area = node.half_area();
         costs[index as usize] = if node.is_leaf {
@@ -103,6 +103,10 @@ pub(super) fn collapse(tree: &BinaryTree, corners: impl Fn(u32) -> [[f32; 3]; 3]
     if tree.nodes.is_empty() {
         return wide;
     }
+    // More than enough, given back at the end: growing would copy all of it several times.
+    let triangles = tree.nodes.len() / 2 + 1;
+    wide.blocks.reserve(triangles / 3 + 1);
+    wide.nodes.reserve(triangles / 8 + 1);
     let costs = evaluate(tree);
     let mut waiting = Vec::new();
     wide.root = emit(tree, &costs, 0, 1, &mut wide, &mut waiting, &corners);
@@ -118,6 +122,8 @@ pub(super) fn collapse(tree: &BinaryTree, corners: impl Fn(u32) -> [[f32; 3]; 3]
         );
         wide.nodes[pending.parent].children[pending.lane] = child;
     }
+    wide.blocks.shrink_to_fit();
+    wide.nodes.shrink_to_fit();
     wide
 }
 
@@ -144,8 +150,13 @@ fn emit(
     let mut lane = 0;
     // Subtrees and the number of children that each may become. At most seven wait here.
     let (_, share) = shares(costs, node, WIDTH);
-    let mut parts = vec![(node.first + 1, WIDTH - share), (node.first, share)];
-    while let Some((index, roots)) = parts.pop() {
+    let mut parts = [(0, 0); WIDTH];
+    parts[0] = (node.first + 1, WIDTH - share);
+    parts[1] = (node.first, share);
+    let mut height = 2;
+    while height > 0 {
+        height -= 1;
+        let (index, roots) = parts[height];
         let part = &tree.nodes[index as usize];
         let part_costs = &costs[index as usize];
         // With fewer children it costs the same: then the box stays whole.
@@ -169,8 +180,9 @@ fn emit(
             lane += 1;
         } else {
             let (_, share) = shares(costs, part, roots);
-            parts.push((part.first + 1, roots - share));
-            parts.push((part.first, share));
+            parts[height] = (part.first + 1, roots - share);
+            parts[height + 1] = (part.first, share);
+            height += 2;
         }
     }
     wide.nodes.push(wide_node);

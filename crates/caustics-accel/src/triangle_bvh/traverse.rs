@@ -1,9 +1,9 @@
 //! The way of a ray through the tree.
 
-use caustics_geometry::glam::Vec3;
-use caustics_geometry::{Hit, Ray, WatertightRay};
+use caustics_geometry::{Hit, Ray};
 
 use super::layout::{Block, Child, Node};
+use super::leaf_test::{Closest, ShearedRay};
 use crate::simd::{Kernel, Lanes, Row, Stack};
 
 /// What traversal reads.
@@ -45,7 +45,7 @@ impl Kernel for Occlusion<'_> {
 }
 
 /// Entries that wait at most; see [`MAX_DEPTH`].
-const STACK: usize = 512;
+pub(super) const STACK: usize = 512;
 
 /// Levels of nodes that the stack suffices for: each leaves at most seven children waiting, and
 /// the last one puts all eight on the stack for a moment.
@@ -58,65 +58,39 @@ pub(super) const MAX_DEPTH: usize = (STACK - 1) / 7;
 /// vertices whose sheared x and y are off by a factor of at most (1 + e)^5, which shifts where it
 /// crosses the two slabs by another 10 e. 20 e covers both and the rounding of this product
 /// (after Ize, *Robust BVH Ray Traversal*, JCGT 2013, whose factor covers the slabs alone).
-const WIDEN: f32 = 1.0 + 20.0 * (f32::EPSILON / 2.0);
+pub(super) const WIDEN: f32 = 1.0 + 20.0 * (f32::EPSILON / 2.0);
 
-/// What is computed once for a ray.
-struct Prepared<F> {
+/// A ray for the test against boxes.
+pub(super) struct Slabs<F> {
     /// By axis.
-    origin: [F; 3],
+    pub(super) origin: [F; 3],
     /// Reciprocal of the direction, by axis, for the side of a box where the ray enters ...
-    inverse_near: [F; 3],
+    pub(super) inverse_near: [F; 3],
     /// ... and for the side where it leaves.
-    inverse_far: [F; 3],
+    pub(super) inverse_far: [F; 3],
     /// By axis, 0 where the ray enters through the lower bound and 1 where through the upper one.
-    near_side: [usize; 3],
-    t_min: F,
-    /// The axis along which the direction is longest comes last.
-    axes: [usize; 3],
-    /// Origin in the order of `axes`.
-    sheared_origin: [F; 3],
-    /// Woop's shear, and the reciprocal of the direction's longest component.
-    shear: [F; 3],
+    pub(super) near_side: [usize; 3],
+    pub(super) t_min: F,
 }
 
 #[inline(always)]
-fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
+pub(super) fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
     [lanes.splat(x), lanes.splat(y), lanes.splat(z)]
 }
 
-impl<F: Copy> Prepared<F> {
-    /// `None` for a ray that cannot hit anything: not finite, or an empty range.
+impl<F: Copy> Slabs<F> {
     #[inline(always)]
-    fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray, t_min: f32) -> Option<Self> {
-        let finite = ray.origin.is_finite() && ray.direction.is_finite();
-        // Also turns away a NaN.
-        let in_range = t_min < ray.t_max;
-        if !(finite && in_range) {
-            return None;
-        }
+    fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
         let inverse = direction.map(|d| 1.0 / d);
-        let longest = ray.direction.abs().max_position();
-        let axes = [(longest + 1) % 3, (longest + 2) % 3, longest];
-        let along = inverse[longest];
-        Some(Self {
+        Self {
             origin: splat(lanes, origin),
             inverse_near: splat(lanes, inverse),
             inverse_far: splat(lanes, inverse.map(|i| i * WIDEN)),
             near_side: direction.map(|d| usize::from(d.is_sign_negative())),
-            t_min: lanes.splat(t_min),
-            axes,
-            sheared_origin: splat(lanes, axes.map(|axis| origin[axis])),
-            shear: splat(
-                lanes,
-                [
-                    direction[axes[0]] / direction[longest],
-                    direction[axes[1]] / direction[longest],
-                    along,
-                ],
-            ),
-        })
+            t_min: lanes.splat(lower_end(ray)),
+        }
     }
 
     /// Where the ray enters the children's boxes, and which ones it meets before `limit`.
@@ -140,230 +114,121 @@ impl<F: Copy> Prepared<F> {
         }
         (near, lanes.bits(lanes.at_most(near, far)))
     }
-
-    /// Moves and shears eight vertices so that the ray becomes the z axis.
-    // Not a closure: those are compiled for the base instructions before they are inlined.
-    #[inline(always)]
-    fn project<L: Lanes<Floats = F>>(&self, lanes: L, rows: &[Row; 3]) -> (F, F, F) {
-        let [x, y, z] = self.axes;
-        let to_x = lanes.sub(lanes.load(&rows[x]), self.sheared_origin[0]);
-        let to_y = lanes.sub(lanes.load(&rows[y]), self.sheared_origin[1]);
-        let to_z = lanes.sub(lanes.load(&rows[z]), self.sheared_origin[2]);
-        (
-            lanes.sub(to_x, lanes.mul(self.shear[0], to_z)),
-            lanes.sub(to_y, lanes.mul(self.shear[1], to_z)),
-            to_z,
-        )
-    }
-
-    /// Tests eight triangles: edge functions for the weights of the three vertices and their sum,
-    /// the ray parameters, and the lanes that are hit between the ray's `t_min` and `limit`.
-    ///
-    /// Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, JCGT 2013: the ray becomes the
-    /// z axis, and every vertex is projected in the same way whatever triangle it belongs to. The
-    /// edge functions of the two triangles at an edge are then exact opposites of each other, as
-    /// long as nothing contracts the products and the difference. One that rounds to zero counts
-    /// as inside for both, so that an edge or vertex is never missed.
-    #[inline(always)]
-    fn hit<L: Lanes<Floats = F>>(&self, lanes: L, block: &Block, limit: F) -> BlockHits<F> {
-        let (a_x, a_y, a_z) = self.project(lanes, &block.vertices[0]);
-        let (b_x, b_y, b_z) = self.project(lanes, &block.vertices[1]);
-        let (c_x, c_y, c_z) = self.project(lanes, &block.vertices[2]);
-        let a = lanes.sub(lanes.mul(c_x, b_y), lanes.mul(c_y, b_x));
-        let b = lanes.sub(lanes.mul(a_x, c_y), lanes.mul(a_y, c_x));
-        let c = lanes.sub(lanes.mul(b_x, a_y), lanes.mul(b_y, a_x));
-        let zero = lanes.splat(0.0);
-        let all_positive = lanes.at_most(zero, lanes.min(lanes.min(a, b), c));
-        let all_negative = lanes.at_most(lanes.max(lanes.max(a, b), c), zero);
-        let inside = lanes.or(all_positive, all_negative);
-        if lanes.bits(inside) == 0 {
-            return BlockHits {
-                b,
-                c,
-                sum: a,
-                t: a,
-                lanes: 0,
-                vanishing: 0,
-            };
-        }
-        let sum = lanes.add(lanes.add(a, b), c);
-        let size = lanes.max(sum, lanes.sub(zero, sum));
-        let vanishing =
-            lanes.bits(lanes.and(inside, lanes.less(size, lanes.splat(f32::MIN_POSITIVE))));
-        let depth = lanes.add(
-            lanes.add(lanes.mul(a, a_z), lanes.mul(b, b_z)),
-            lanes.mul(c, c_z),
-        );
-        let t = lanes.div(lanes.mul(depth, self.shear[2]), sum);
-        let in_range = lanes.and(lanes.less(self.t_min, t), lanes.at_most(t, limit));
-        let hit = lanes.bits(lanes.and(inside, in_range)) & !vanishing;
-        BlockHits {
-            b,
-            c,
-            sum,
-            t,
-            lanes: hit,
-            vanishing,
-        }
-    }
-}
-
-struct BlockHits<F> {
-    b: F,
-    c: F,
-    sum: F,
-    t: F,
-    /// Lanes that are hit.
-    lanes: u32,
-    /// Lanes whose edge functions are too small for normal floats and say nothing.
-    vanishing: u32,
-}
-
-/// The test again for one triangle whose edge functions vanish, with products that do not.
-#[cold]
-#[inline(never)]
-fn hit_vanishing(block: &Block, lane: usize, ray: &Ray, limit: f32) -> Option<Hit> {
-    let [a, b, c] = block
-        .vertices
-        .map(|rows| Vec3::from_array(rows.map(|row| row[lane])));
-    let ray = Ray {
-        t_min: lower_end(ray),
-        ..*ray
-    };
-    let hit = WatertightRay::new(&ray).intersect(a, b, c, limit.next_up())?;
-    Some(Hit {
-        t: hit.t,
-        u: hit.u,
-        v: hit.v,
-        primitive: block.primitives[lane],
-    })
-}
-
-/// Whether a hit comes before another one.
-#[inline(always)]
-fn is_nearer(t: f32, primitive: u32, than: Option<Hit>) -> bool {
-    than.is_none_or(|than| t < than.t || (t == than.t && primitive < than.primitive))
 }
 
 /// A waiting child, ordered by where the ray enters its box: never a negative number, so that its
 /// bits are ordered as it is.
 #[inline(always)]
-fn entry(near: f32, child: Child) -> u64 {
+pub(super) fn entry(near: f32, child: Child) -> u64 {
     (u64::from(near.to_bits()) << 32) | u64::from(child.0)
 }
 
 #[inline(always)]
-fn child_of(entry: u64) -> Child {
+pub(super) fn child_of(entry: u64) -> Child {
     Child(entry as u32)
 }
 
 #[inline(always)]
-fn near_of(entry: u64) -> f32 {
+pub(super) fn near_of(entry: u64) -> f32 {
     f32::from_bits((entry >> 32) as u32)
 }
 
 /// Removes and returns the lowest set bit's index.
 #[inline(always)]
-fn next_lane(bits: &mut u32) -> usize {
+pub(super) fn next_lane(bits: &mut u32) -> usize {
     // The mask tells the compiler that the lane is in range.
     let lane = bits.trailing_zeros() as usize & 7;
     *bits &= *bits - 1;
     lane
 }
 
+/// Whether a ray can hit anything: it is finite and its range is not empty.
+#[inline(always)]
+pub(super) fn is_usable(ray: &Ray) -> bool {
+    // The comparison also turns away a NaN.
+    ray.origin.is_finite() && ray.direction.is_finite() && lower_end(ray) < ray.t_max
+}
+
 /// Lower end of the ray's range: boxes are entered at no negative parameter.
 #[inline(always)]
-fn lower_end(ray: &Ray) -> f32 {
+pub(super) fn lower_end(ray: &Ray) -> f32 {
     // A negative zero would sort above everything.
     ray.t_min.max(0.0) + 0.0
 }
 
+/// Chooses the nearest of the children that are met, of which there is at least one; the others
+/// go on the stack, the farthest first.
 #[inline(always)]
-fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
-    let prepared = Prepared::new(lanes, ray, lower_end(ray))?;
-    // Hits at exactly this parameter count, so that of two at the same place the one with the
-    // lower index wins, whichever is found first.
-    let mut limit = ray.t_max.next_down();
-    let mut limits = lanes.splat(limit);
-    let mut widened = limit * WIDEN;
-    let mut hit = None::<Hit>;
+fn descend(stack: &mut Stack<u64, STACK>, node: &Node, mut met: u32, near: &Row) -> Child {
+    let first = next_lane(&mut met);
+    if met == 0 {
+        return node.children[first];
+    }
+    let first = entry(near[first], node.children[first]);
+    let second = next_lane(&mut met);
+    let second = entry(near[second], node.children[second]);
+    let (mut nearest, farther) = if first < second {
+        (first, second)
+    } else {
+        (second, first)
+    };
+    stack.push(farther);
+    let mut pushed = 1;
+    while met != 0 {
+        let lane = next_lane(&mut met);
+        let next = entry(near[lane], node.children[lane]);
+        if next < nearest {
+            stack.push(nearest);
+            nearest = next;
+        } else {
+            stack.insert(next, pushed);
+        }
+        pushed += 1;
+    }
+    child_of(nearest)
+}
+
+#[inline(always)]
+pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
+    if !is_usable(ray) {
+        return None;
+    }
+    let mut closest = Closest::new(ray);
+    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
+    search(lanes, tree, tree.root, &slabs, &sheared, ray, &mut closest);
+    closest.hit
+}
+
+/// Looks below one child for something closer.
+#[inline(always)]
+pub(super) fn search<L: Lanes>(
+    lanes: L,
+    tree: Tree<'_>,
+    start: Child,
+    slabs: &Slabs<L::Floats>,
+    sheared: &ShearedRay,
+    ray: &Ray,
+    closest: &mut Closest,
+) {
+    let mut widened = closest.limit * WIDEN;
     let mut stack = Stack::<u64, STACK>::new();
-    let mut current = tree.root;
+    let mut current = start;
     loop {
         while !current.is_leaf() {
             let node = &tree.nodes[current.index()];
-            let (near, mut met) = prepared.meet(lanes, node, lanes.splat(widened));
+            let (near, met) = slabs.meet(lanes, node, lanes.splat(widened));
             if met == 0 {
                 break;
             }
-            let first = next_lane(&mut met);
-            if met == 0 {
-                current = node.children[first];
-                continue;
-            }
-            let near = lanes.store(near);
-            let first = entry(near[first], node.children[first]);
-            let second = next_lane(&mut met);
-            let second = entry(near[second], node.children[second]);
-            let (mut nearest, farther) = if first < second {
-                (first, second)
-            } else {
-                (second, first)
-            };
-            stack.push(farther);
-            let mut pushed = 1;
-            while met != 0 {
-                let lane = next_lane(&mut met);
-                let next = entry(near[lane], node.children[lane]);
-                if next < nearest {
-                    stack.push(nearest);
-                    nearest = next;
-                } else {
-                    stack.insert(next, pushed);
-                }
-                pushed += 1;
-            }
-            current = child_of(nearest);
+            current = descend(&mut stack, node, met, &lanes.store(near));
         }
         if current.is_leaf() {
-            for block in &tree.blocks[current.blocks()] {
-                let found = prepared.hit(lanes, block, limits);
-                if found.lanes | found.vanishing == 0 {
-                    continue;
-                }
-                let t = lanes.store(found.t);
-                let mut bits = found.lanes;
-                while bits != 0 {
-                    let lane = next_lane(&mut bits);
-                    let primitive = block.primitives[lane];
-                    if is_nearer(t[lane], primitive, hit) {
-                        let sum = lanes.store(found.sum)[lane];
-                        limit = t[lane];
-                        hit = Some(Hit {
-                            t: limit,
-                            u: lanes.store(found.b)[lane] / sum,
-                            v: lanes.store(found.c)[lane] / sum,
-                            primitive,
-                        });
-                    }
-                }
-                let mut bits = found.vanishing;
-                while bits != 0 {
-                    let candidate = hit_vanishing(block, next_lane(&mut bits), ray, limit);
-                    if let Some(candidate) = candidate
-                        && is_nearer(candidate.t, candidate.primitive, hit)
-                    {
-                        limit = candidate.t;
-                        hit = Some(candidate);
-                    }
-                }
-                limits = lanes.splat(limit);
-                widened = limit * WIDEN;
-            }
+            sheared.find_closest(lanes, tree.blocks, current.blocks(), ray, closest);
+            widened = closest.limit * WIDEN;
         }
         loop {
             let Some(next) = stack.pop() else {
-                return hit;
+                return;
             };
             if near_of(next) <= widened {
                 current = child_of(next);
@@ -375,32 +240,24 @@ fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
 
 #[inline(always)]
 fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
-    let Some(prepared) = Prepared::new(lanes, ray, lower_end(ray)) else {
+    if !is_usable(ray) {
         return false;
-    };
+    }
+    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
     let limit = ray.t_max.next_down();
-    let limits = lanes.splat(limit);
     let widened = lanes.splat(limit * WIDEN);
     let mut stack = Stack::<u64, STACK>::new();
     stack.push(u64::from(tree.root.0));
     while let Some(next) = stack.pop() {
         let current = child_of(next);
         if current.is_leaf() {
-            for block in &tree.blocks[current.blocks()] {
-                let mut found = prepared.hit(lanes, block, limits);
-                if found.lanes != 0 {
-                    return true;
-                }
-                while found.vanishing != 0 {
-                    let lane = next_lane(&mut found.vanishing);
-                    if hit_vanishing(block, lane, ray, limit).is_some() {
-                        return true;
-                    }
-                }
+            let leaf = current.blocks();
+            if sheared.hits_any(lanes, tree.blocks, leaf, ray, limit) {
+                return true;
             }
         } else {
             let node = &tree.nodes[current.index()];
-            let (_, mut met) = prepared.meet(lanes, node, widened);
+            let (_, mut met) = slabs.meet(lanes, node, widened);
             while met != 0 {
                 stack.push(u64::from(node.children[next_lane(&mut met)].0));
             }

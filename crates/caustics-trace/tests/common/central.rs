@@ -22,7 +22,11 @@ impl PointAndDirection {
         let relative = |a: DVec3, b: DVec3| {
             let difference = (a - b).length();
             // Zero on both sides, as the direction of parallel rays is.
-            if difference == 0.0 { 0.0 } else { difference / b.length() }
+            if difference == 0.0 {
+                0.0
+            } else {
+                difference / b.length()
+            }
         };
         relative(self.position, other.position).max(relative(self.direction, other.direction))
     }

@@ -56,7 +56,10 @@ pub(crate) struct Jitter {
 }
 
 impl Jitter {
-    pub(crate) const NONE: Self = Self { seed: 0, relative: 0.0 };
+    pub(crate) const NONE: Self = Self {
+        seed: 0,
+        relative: 0.0,
+    };
 
     fn vector(&self, rng: &mut CounterRng) -> DVec3 {
         let mut coordinate = || f64::from(rng.next_f32()) * 2.0 - 1.0;
@@ -84,12 +87,19 @@ impl Shape {
     fn extent(&self) -> f64 {
         let points = match self {
             Self::Plane(plane) => [plane.point; 3],
-            Self::Sphere { sphere, .. } => {
-                [sphere.center - sphere.radius, sphere.center, sphere.center + sphere.radius]
-            }
+            Self::Sphere { sphere, .. } => [
+                sphere.center - sphere.radius,
+                sphere.center,
+                sphere.center + sphere.radius,
+            ],
             Self::Triangle { triangle, .. } => [triangle.a, triangle.b, triangle.c],
         };
-        f64::from(points.map(|point| point.abs().max_element()).into_iter().fold(0.0, f32::max))
+        f64::from(
+            points
+                .map(|point| point.abs().max_element())
+                .into_iter()
+                .fold(0.0, f32::max),
+        )
     }
 
     pub(crate) fn hit(&self, origin: DVec3, direction: DVec3) -> Option<ExactHit> {
@@ -126,8 +136,18 @@ impl Shape {
                 (position, cross.normalize(), shading)
             }
         };
-        let facing = |normal: DVec3| if normal.dot(direction) < 0.0 { normal } else { -normal };
-        Some(ExactHit { position, geometric: facing(geometric), shading: facing(shading) })
+        let facing = |normal: DVec3| {
+            if normal.dot(direction) < 0.0 {
+                normal
+            } else {
+                -normal
+            }
+        };
+        Some(ExactHit {
+            position,
+            geometric: facing(geometric),
+            shading: facing(shading),
+        })
     }
 }
 
@@ -180,7 +200,10 @@ impl Chain {
                 let hit = shape.hit(path.position + moved, direction)?;
                 let normal = (hit.shading + bent).normalize();
                 let direction = changed(*change, direction, normal)?;
-                Some(PointAndDirection { position: hit.position, direction })
+                Some(PointAndDirection {
+                    position: hit.position,
+                    direction,
+                })
             };
             (center, path) = (onwards(center)?, onwards(path)?);
             // What lies between neighbours is rounded, too.
@@ -230,20 +253,35 @@ fn meet(shape: &Shape, ray: &Ray) -> Option<Met> {
         Shape::Plane(plane) => {
             let t = plane.intersect(ray)?;
             let gradient = NormalGradient::flat(plane.normal);
-            Some(Met { t, spawn: SpawnPoint::free(ray.at(t)), geometric: plane.normal, gradient })
+            Some(Met {
+                t,
+                spawn: SpawnPoint::free(ray.at(t)),
+                geometric: plane.normal,
+                gradient,
+            })
         }
         Shape::Sphere { sphere, .. } => {
             let t = sphere.intersect(ray)?;
             let spawn = SpawnPoint::on_sphere(sphere, ray.at(t));
             let gradient = NormalGradient::on_sphere(sphere, spawn.position);
-            Some(Met { t, spawn, geometric: gradient.normal, gradient })
+            Some(Met {
+                t,
+                spawn,
+                geometric: gradient.normal,
+                gradient,
+            })
         }
         Shape::Triangle { triangle, normals } => {
             let hit = PrecomputedTriangle::new(triangle).intersect(ray)?;
             let Triangle { a, b, c } = *triangle;
             let spawn = SpawnPoint::on_triangle(a, b, c, hit.u, hit.v);
             let gradient = NormalGradient::on_triangle(triangle, *normals, hit.u, hit.v)?;
-            Some(Met { t: hit.t, spawn, geometric: triangle.unit_normal()?, gradient })
+            Some(Met {
+                t: hit.t,
+                spawn,
+                geometric: triangle.unit_normal()?,
+                gradient,
+            })
         }
     }
 }
@@ -258,7 +296,10 @@ impl Chain {
             let met = meet(shape, &ray)?;
             differential = if operations == Operations::WithoutDistanceChange {
                 let moved = |i: usize| differential.position[i] + met.t * differential.direction[i];
-                RayDifferential { position: [moved(0), moved(1)], ..differential }
+                RayDifferential {
+                    position: [moved(0), moved(1)],
+                    ..differential
+                }
             } else {
                 differential.transferred(direction, met.t, met.geometric)
             };
@@ -283,10 +324,12 @@ impl Chain {
                     let refracted = refract(direction, normal, eta)?;
                     differential = if operations == Operations::WithoutMuSlope {
                         let mu = eta * direction.dot(normal) - refracted.dot(normal);
-                        let turned = |i: usize| {
-                            eta * differential.direction[i] - mu * normal_change[i]
-                        };
-                        RayDifferential { direction: [turned(0), turned(1)], ..differential }
+                        let turned =
+                            |i: usize| eta * differential.direction[i] - mu * normal_change[i];
+                        RayDifferential {
+                            direction: [turned(0), turned(1)],
+                            ..differential
+                        }
                     } else {
                         differential.refracted(direction, refracted, normal, eta, normal_change)
                     };

@@ -3,27 +3,36 @@
 use caustics_accel::{BvhOptions, Intersect};
 use caustics_geometry::TriangleMesh;
 use caustics_geometry::shapes::{cuboid, quad};
-use caustics_sampling::Sequence;
+use caustics_sampling::{PointSet, Sequence};
 use caustics_scene::{Instance, Light, Material, Scene, SceneIntersector, Shape, World};
 use caustics_trace::glam::{Affine3A, Vec3};
-use caustics_trace::{Aim, Branching, PhotonMap, TraceOptions, trace_photons};
+use caustics_trace::{
+    Aim, Branching, EmissionSample, Emitter, PhotonMap, TraceOptions, trace_photons,
+};
 
 pub(crate) fn add_mesh(scene: &mut Scene, name: &str, mesh: TriangleMesh, material: Material) {
     let shape = Shape::Mesh(scene.add_mesh(mesh));
     let material = scene.add_material(material).expect("a valid material");
-    scene.add_instance(Instance::new(name, shape, material)).expect("a valid instance");
+    scene
+        .add_instance(Instance::new(name, shape, material))
+        .expect("a valid instance");
 }
 
 pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: Material) {
     let material = scene.add_material(material).expect("a valid material");
     let shape = Shape::Sphere { center, radius };
-    scene.add_instance(Instance::new("sphere", shape, material)).expect("a valid instance");
+    scene
+        .add_instance(Instance::new("sphere", shape, material))
+        .expect("a valid instance");
 }
 
 /// A solid box between two corners.
 pub(crate) fn add_box(scene: &mut Scene, name: &str, from: Vec3, to: Vec3, material: Material) {
     let place = Affine3A::from_translation(0.5 * (from + to));
-    let mesh = cuboid(to - from).expect("a valid box").transformed(&place).expect("a finite box");
+    let mesh = cuboid(to - from)
+        .expect("a valid box")
+        .transformed(&place)
+        .expect("a finite box");
     add_mesh(scene, name, mesh, material);
 }
 
@@ -36,7 +45,9 @@ pub(crate) fn add_floor(scene: &mut Scene, height: f32, half: f32) {
 
 pub(crate) fn flattened(scene: &Scene) -> (World, SceneIntersector) {
     let world = World::new(scene).expect("a small world");
-    let intersector = SceneIntersector::new(&world, &BvhOptions::default()).expect("a small tree");
+    let intersector = world
+        .intersector(&BvhOptions::default())
+        .expect("a small tree");
     (world, intersector)
 }
 
@@ -66,4 +77,24 @@ pub(crate) fn trace_one(scene: &Scene, tracer: &impl Intersect, light: Light) ->
     scene.add_light(light).expect("a valid light");
     let world = World::new(&scene).expect("a small world");
     trace_photons(&world, tracer, &ONE_PHOTON(), &|_| {}).expect("valid options")
+}
+
+/// The spacing of photons, in radians: about as small as a spot light can be, so that few
+/// differentials meet their bound.
+pub(crate) const SPACING: f32 = 2e-3;
+
+/// The changes of direction, for one spacing each, of the neighbours of a light's only ray.
+pub(crate) fn initial_turns(scene: &Scene, origin: Vec3, onwards: Vec3) -> [Vec3; 2] {
+    let mut scene = scene.clone();
+    scene
+        .add_light(single_ray(origin, onwards, SPACING))
+        .expect("a valid light");
+    let world = World::new(&scene).expect("a small world");
+    let emitters = Emitter::all(&world, Aim::Everywhere);
+    let sample = EmissionSample::of(&PointSet::new(Sequence::Grid, 1, 0), 0);
+    let emission = emitters[0]
+        .emit::<2>(&sample)
+        .expect("the axis is in the cone");
+    assert!((emission.ray.direction - onwards.normalize()).length() < 1e-6);
+    emission.differential.direction
 }
