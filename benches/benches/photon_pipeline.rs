@@ -78,11 +78,11 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
         .measurement_time(Duration::from_secs(5));
     group.throughput(Throughput::Elements(u64::from(PHOTONS)));
     group.bench_function("photons traced", |bencher| {
-        bencher.iter(|| black_box(trace()))
+        bencher.iter(|| black_box(trace()));
     });
     group.throughput(Throughput::Elements(photons.len() as u64));
     group.bench_function("footprints splatted", |bencher| {
-        bencher.iter(|| black_box(splatted()))
+        bencher.iter(|| black_box(splatted()));
     });
     group.throughput(Throughput::Elements(points.len() as u64));
     group.bench_function("points gathered from footprints", |bencher| {
