@@ -98,7 +98,10 @@ pub(crate) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Request
         }
     }
     result.picture.seed = result.caustics.trace.seed;
-    result.picture.validate().map_err(|error| format!("--width, --height: {error}"))?;
+    result
+        .picture
+        .validate()
+        .map_err(|error| format!("--width, --height: {error}"))?;
     Ok(Request::Render(Box::new(result)))
 }
 
@@ -171,17 +174,25 @@ impl Arguments {
 }
 
 fn text(name: &str, parser: &mut Parser) -> Result<String, String> {
-    let value = parser.value().map_err(|_| format!("--{name}: a value is missing"))?;
-    value.string().map_err(|_| format!("--{name}: the value is not valid text"))
+    let value = parser
+        .value()
+        .map_err(|_| format!("--{name}: a value is missing"))?;
+    value
+        .string()
+        .map_err(|_| format!("--{name}: the value is not valid text"))
 }
 
 fn path(name: &str, parser: &mut Parser) -> Result<PathBuf, String> {
-    Ok(parser.value().map_err(|_| format!("--{name}: a file name is missing"))?.into())
+    Ok(parser
+        .value()
+        .map_err(|_| format!("--{name}: a file name is missing"))?
+        .into())
 }
 
 fn number<T: FromStr<Err: Display>>(name: &str, parser: &mut Parser) -> Result<T, String> {
     let text = text(name, parser)?;
-    text.parse().map_err(|error| format!("--{name} {text}: {error}"))
+    text.parse()
+        .map_err(|error| format!("--{name} {text}: {error}"))
 }
 
 /// A whole number of which there is at least one.
@@ -190,24 +201,37 @@ where
     T: FromStr<Err: Display> + Default + PartialEq,
 {
     let value = number(name, parser)?;
-    if value == T::default() { Err(format!("--{name} 0: at least 1")) } else { Ok(value) }
+    if value == T::default() {
+        Err(format!("--{name} 0: at least 1"))
+    } else {
+        Ok(value)
+    }
 }
 
 fn finite(name: &str, parser: &mut Parser) -> Result<f32, String> {
     let value: f32 = number(name, parser)?;
-    if value.is_finite() { Ok(value) } else { Err(format!("--{name} {value}: not finite")) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("--{name} {value}: not finite"))
+    }
 }
 
 fn choice<T: Copy>(name: &str, parser: &mut Parser, all: &[(&str, T)]) -> Result<T, String> {
     let text = text(name, parser)?;
-    all.iter().find(|(known, _)| *known == text).map(|&(_, value)| value).ok_or_else(|| {
-        let names: Vec<&str> = all.iter().map(|&(known, _)| known).collect();
-        format!("--{name} {text}: not one of {}", names.join(", "))
-    })
+    all.iter()
+        .find(|(known, _)| *known == text)
+        .map(|&(_, value)| value)
+        .ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(|&(known, _)| known).collect();
+            format!("--{name} {text}: not one of {}", names.join(", "))
+        })
 }
 
 fn list_estimates() -> String {
-    let lines: Vec<String> =
-        Estimate::ALL.iter().map(|it| format!("{:<12} {}", it.name(), it.summary())).collect();
+    let lines: Vec<String> = Estimate::ALL
+        .iter()
+        .map(|it| format!("{:<12} {}", it.name(), it.summary()))
+        .collect();
     lines.join("\n")
 }

@@ -53,12 +53,18 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let start = Instant::now();
     let (name, mut scene, warnings) = load(arguments.scene.as_deref())?;
-    let notices =
-        default_view::complete(&mut scene).map_err(|error| format!("{name}: {error}"))?;
-    let camera = scene.cameras().get(arguments.camera).cloned().ok_or_else(|| {
-        let count = scene.cameras().len();
-        format!("{name}: there is no camera {}, the scene has {count}", arguments.camera)
-    })?;
+    let notices = default_view::complete(&mut scene).map_err(|error| format!("{name}: {error}"))?;
+    let camera = scene
+        .cameras()
+        .get(arguments.camera)
+        .cloned()
+        .ok_or_else(|| {
+            let count = scene.cameras().len();
+            format!(
+                "{name}: there is no camera {}, the scene has {count}",
+                arguments.camera
+            )
+        })?;
     outputs::check(arguments)?;
     // Only now, so that a failure is the one line that it says it is.
     for warning in warnings {
@@ -70,15 +76,18 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let load_seconds = start.elapsed().as_secs_f64();
 
     let reporter = Reporter::new();
-    let caustics =
-        Caustics::with_progress(&scene, &arguments.caustics, &|progress| reporter.advance(progress))
-            .map_err(|error| format!("{name}: {error}"))?;
+    let caustics = Caustics::with_progress(&scene, &arguments.caustics, &|progress| {
+        reporter.advance(progress);
+    })
+    .map_err(|error| format!("{name}: {error}"))?;
     if caustics.map().photons.is_empty() && arguments.caustics.trace.photons > 0 {
         eprintln!("note: no photon landed after meeting glass or metal, so there is no caustic");
     }
     let start = Instant::now();
     let picture = caustics
-        .render_with_progress(&camera, &arguments.picture, &|progress| reporter.advance(progress))
+        .render_with_progress(&camera, &arguments.picture, &|progress| {
+            reporter.advance(progress);
+        })
         .map_err(|error| format!("{name}: {error}"))?;
     let render_seconds = start.elapsed().as_secs_f64();
     reporter.finish();
@@ -97,13 +106,21 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         std::fs::write(path, report.to_json())
             .map_err(|error| format!("{}: cannot write: {error}", path.display()))?;
     }
-    let _ = writeln!(std::io::stdout(), "{report}wrote {}", arguments.out.display());
+    let _ = writeln!(
+        std::io::stdout(),
+        "{report}wrote {}",
+        arguments.out.display()
+    );
     Ok(())
 }
 
 fn load(path: Option<&Path>) -> Result<(String, Scene, Vec<gltf::Warning>), Failure> {
     let Some(path) = path else {
-        return Ok(("the built-in cognac glass".into(), builtin::cognac_glass(), Vec::new()));
+        return Ok((
+            "the built-in cognac glass".into(),
+            builtin::cognac_glass(),
+            Vec::new(),
+        ));
     };
     let name = path.display().to_string();
     let loaded = gltf::load_path(path).map_err(|error| format!("{name}: {error}"))?;

@@ -48,7 +48,13 @@ impl<'a> Report<'a> {
         picture: &'a Picture,
         seconds: Seconds,
     ) -> Self {
-        Self { name, arguments, caustics, picture, seconds }
+        Self {
+            name,
+            arguments,
+            caustics,
+            picture,
+            seconds,
+        }
     }
 
     fn photon_rays_per_second(&self) -> f64 {
@@ -61,9 +67,8 @@ impl<'a> Report<'a> {
 
     pub(crate) fn to_json(&self) -> String {
         let ledger = &self.caustics.map().ledger;
-        let entry = |entry: LedgerEntry| {
-            json!({ "count": entry.count, "watts": entry.flux.to_array() })
-        };
+        let entry =
+            |entry: LedgerEntry| json!({ "count": entry.count, "watts": entry.flux.to_array() });
         let fates: Map<String, Value> = Fate::ALL
             .iter()
             .map(|&fate| (fate.name().replace(' ', "_"), entry(ledger.entry(fate))))
@@ -106,15 +111,27 @@ impl fmt::Display for Report<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ledger = &self.caustics.map().ledger;
         writeln!(f, "{}", self.name)?;
-        writeln!(f, "  triangles        {:>12}", self.caustics.world().triangles().len())?;
+        writeln!(
+            f,
+            "  triangles        {:>12}",
+            self.caustics.world().triangles().len()
+        )?;
         writeln!(f, "  photons emitted  {:>12}", ledger.emitted().count)?;
-        writeln!(f, "  photons stored   {:>12}", self.caustics.map().photons.len())?;
+        writeln!(
+            f,
+            "  photons stored   {:>12}",
+            self.caustics.map().photons.len()
+        )?;
         writeln!(f, "  energy                  count          watts    share")?;
         let total = ledger.emitted().flux.element_sum().max(f64::MIN_POSITIVE);
         let mut line = |name: &str, entry: LedgerEntry| {
             let watts = entry.flux.element_sum() / 3.0;
             let share = 100.0 * entry.flux.element_sum() / total;
-            writeln!(f, "    {name:<12} {:>14} {watts:>14.6} {share:>7.3} %", entry.count)
+            writeln!(
+                f,
+                "    {name:<12} {:>14} {watts:>14.6} {share:>7.3} %",
+                entry.count
+            )
         };
         line("emitted", ledger.emitted())?;
         for fate in Fate::ALL {

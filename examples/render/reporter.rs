@@ -24,20 +24,32 @@ struct Current {
 
 impl Reporter {
     pub(crate) fn new() -> Self {
-        Self { current: Mutex::new(None), on_terminal: std::io::stderr().is_terminal() }
+        Self {
+            current: Mutex::new(None),
+            on_terminal: std::io::stderr().is_terminal(),
+        }
     }
 
     pub(crate) fn advance(&self, progress: Progress) {
         // A poisoned lock means that another thread panicked: it is that panic which matters.
-        let Ok(mut current) = self.current.lock() else { return };
+        let Ok(mut current) = self.current.lock() else {
+            return;
+        };
         if current.as_ref().is_none_or(|it| it.stage != progress.stage) {
             if let Some(bar) = current.take().and_then(|it| it.bar) {
                 bar.finish_and_clear();
             }
             let bar = self.on_terminal.then(|| new_bar(progress));
-            *current = Some(Current { stage: progress.stage, finished: 0, told: 0, bar });
+            *current = Some(Current {
+                stage: progress.stage,
+                finished: 0,
+                told: 0,
+                bar,
+            });
         }
-        let Some(current) = current.as_mut() else { return };
+        let Some(current) = current.as_mut() else {
+            return;
+        };
         current.finished += progress.finished;
         if let Some(bar) = &current.bar {
             bar.set_position(current.finished);

@@ -35,16 +35,21 @@ fn files(name: &str, seed: u64, threads: usize) -> Result<[Vec<u8>; 2], TestErro
 
 #[test]
 fn threads_do_not_change_a_bit() -> Result<(), TestError> {
-    for name in gallery::names()? {
-        let one = files(&name, 7, 1)?;
+    for name in [
+        "p03_cognac",
+        "p06_wave_plane",
+        "p09_cornell",
+        "p10_torus_cube",
+    ] {
+        let one = files(name, 7, 1)?;
         for threads in [2, 8] {
             assert!(
-                files(&name, 7, threads)? == one,
+                files(name, 7, threads)? == one,
                 "{name} on {threads} threads"
             );
         }
         // Files that are the same whatever is asked for would pass as well.
-        let other = files(&name, 8, 2)?;
+        let other = files(name, 8, 2)?;
         assert!(
             other[0] != one[0] && other[1] != one[1],
             "{name} with another seed"

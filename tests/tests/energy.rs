@@ -1,10 +1,12 @@
 //! Every watt is booked once, and the caustic is as bright however it is sampled.
 
+use caustics_accel::BvhOptions;
 use caustics_sampling::Sequence;
+use caustics_scene::World;
 use caustics_tests::measure::trace;
 use caustics_tests::{TestError, gallery};
 use caustics_trace::glam::Vec3;
-use caustics_trace::{Aim, Branching, Fate, TraceOptions};
+use caustics_trace::{Aim, Branching, Fate, TraceOptions, trace_photons};
 
 const BRANCHINGS: [Branching; 3] = [
     Branching::Roulette,
@@ -25,7 +27,8 @@ fn the_ledger_balances() -> Result<(), TestError> {
     let names = gallery::names()?;
     assert!(names.len() >= 3, "{names:?}");
     for name in names {
-        let scene = gallery::load(&name)?;
+        let world = World::new(&gallery::load(&name)?)?;
+        let intersector = world.intersector(&BvhOptions::default())?;
         let mut worst = 0.0f64;
         for (branching, aim) in ways() {
             let options = TraceOptions {
@@ -34,7 +37,7 @@ fn the_ledger_balances() -> Result<(), TestError> {
                 aim,
                 ..TraceOptions::default()
             };
-            let ledger = trace(&scene, &options)?.ledger;
+            let ledger = trace_photons(&world, &intersector, &options, &|_| {})?.ledger;
             worst = worst.max(ledger.imbalance());
             assert!(
                 ledger.imbalance() < 1e-9,
@@ -93,26 +96,32 @@ fn stored(name: &str, options: &TraceOptions, seeds: u32) -> Result<(f64, f64), 
 
 #[test]
 fn the_caustic_is_as_bright_for_every_aim_and_branching() -> Result<(), TestError> {
-    for name in ["p03_cognac", "p05_brass_ring", "p10_torus_cube"] {
+    let (all, one) = (Branching::SplitAll, Branching::Roulette);
+    let (wide, narrow) = (Aim::Everywhere, Aim::Casters);
+    for name in [
+        "p03_cognac",
+        "p04_sphere_in_box",
+        "p05_brass_ring",
+        "p06_wave_plane",
+        "p09_cornell",
+        "p10_torus_cube",
+    ] {
         let options = TraceOptions {
             photons: 1 << 16,
             sequence: Sequence::Halton,
-            branching: Branching::SplitAll,
-            aim: Aim::Casters,
+            branching: all,
+            aim: narrow,
             ..TraceOptions::default()
         };
         let (flux, error) = stored(name, &options, 8)?;
         println!("{name}: {flux:.4} W +- {:.1e}", error / flux);
-        let rest = ways().filter(|&way| way != (options.branching, options.aim));
-        for (branching, aim) in rest {
-            // Most photons that are aimed at nothing miss everything.
-            let photons = if aim == Aim::Everywhere {
-                1 << 17
-            } else {
-                1 << 16
-            };
+        for (branching, aim) in [
+            (one, narrow),
+            (Branching::SplitFirst, narrow),
+            (all, wide),
+            (one, wide),
+        ] {
             let options = TraceOptions {
-                photons,
                 branching,
                 aim,
                 ..options
@@ -125,9 +134,11 @@ fn the_caustic_is_as_bright_for_every_aim_and_branching() -> Result<(), TestErro
                 difference.abs() < 5.0 * deviation.max(2e-4),
                 "{name} {branching:?} {aim:?}"
             );
-            // A part in fifty would have been seen.
+            // Most photons that are aimed at nothing miss everything; a part in thirty of the flux
+            // would still have been seen, and one in two hundred of aimed photons.
+            let limit = if aim == wide { 6e-3 } else { 1e-3 };
             assert!(
-                deviation < 4e-3,
+                deviation < limit,
                 "{name} {branching:?} {aim:?}: {deviation}"
             );
         }

@@ -8,6 +8,7 @@ use caustics_tests::measure::{FluxProbes, Region, convergence, trace, without_ch
 use caustics_tests::oracles::{RadialLens, SphereLens};
 use caustics_trace::{Photon, TraceOptions};
 use glam::{DVec2, Vec3};
+use std::f64::consts::TAU;
 
 /// Nearer than the paraxial focus, at 1.5: three rays land inside a bright edge, one outside.
 const FOLDED: SphereLens = SphereLens {
@@ -123,7 +124,7 @@ fn nearest_photons_give_the_irradiance() -> Result<(), TestError> {
             // Mean over the circle, and the worst place on it.
             let (mut sum, mut worst) = (0.0, 0.0f64);
             for step in 0..16 {
-                let at = radius * DVec2::from_angle(0.1 + f64::from(step) * 0.392_7);
+                let at = radius * DVec2::from_angle(0.1 + f64::from(step) * TAU / 16.0);
                 let position = Vec3::new(at.x as f32, -lens.floor_distance as f32, at.y as f32);
                 let found = estimate.irradiance(position, Vec3::Y, &mut scratch);
                 let ratio = f64::from(found.x) / exact;

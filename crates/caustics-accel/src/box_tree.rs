@@ -40,7 +40,10 @@ impl BoxTree {
         let boxes: Vec<Bounds> = boxes
             .iter()
             .enumerate()
-            .map(|(index, &bounds)| Bounds { bounds, index: index as u32 })
+            .map(|(index, &bounds)| Bounds {
+                bounds,
+                index: index as u32,
+            })
             .collect();
         let indices = (0..boxes.len() as u32).collect();
         let mut tree = PlocBuilder::new().build(

@@ -14,7 +14,11 @@ pub(crate) struct Columns {
 
 impl Columns {
     pub(crate) fn zero(count: usize) -> Self {
-        Self { x: vec![0.0; count], y: vec![0.0; count], z: vec![0.0; count] }
+        Self {
+            x: vec![0.0; count],
+            y: vec![0.0; count],
+            z: vec![0.0; count],
+        }
     }
 
     pub(crate) fn get(&self, index: usize) -> Vec3 {
@@ -27,7 +31,11 @@ impl Columns {
 
     /// The lists in pieces of `size`, in order.
     pub(crate) fn chunks_mut(&mut self, size: usize) -> impl Iterator<Item = ColumnsMut<'_>> {
-        let zip = self.x.chunks_mut(size).zip(self.y.chunks_mut(size)).zip(self.z.chunks_mut(size));
+        let zip = self
+            .x
+            .chunks_mut(size)
+            .zip(self.y.chunks_mut(size))
+            .zip(self.z.chunks_mut(size));
         zip.map(|((x, y), z)| ColumnsMut { x, y, z })
     }
 }
@@ -48,8 +56,10 @@ pub(crate) struct TexelColumns {
 
 impl TexelColumns {
     pub(crate) fn new(texels: &[Option<Texel>]) -> Self {
-        let mut columns =
-            Self { position: Columns::zero(texels.len()), normal: Columns::zero(texels.len()) };
+        let mut columns = Self {
+            position: Columns::zero(texels.len()),
+            normal: Columns::zero(texels.len()),
+        };
         for (index, texel) in texels.iter().enumerate() {
             if let Some(texel) = texel {
                 columns.position.set(index, texel.position);
@@ -86,7 +96,10 @@ impl TexelColumns {
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the same as `light`, and its kernel")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the same as `light`, and its kernel"
+    )]
     #[inline]
     fn light_by(
         &self,
@@ -105,15 +118,21 @@ impl TexelColumns {
             &self.position.y[read.clone()],
             &self.position.z[read.clone()],
         );
-        let (nx, ny, nz) =
-            (&self.normal.x[read.clone()], &self.normal.y[read.clone()], &self.normal.z[read]);
+        let (nx, ny, nz) = (
+            &self.normal.x[read.clone()],
+            &self.normal.y[read.clone()],
+            &self.normal.z[read],
+        );
         let red = &mut irradiance.x[write.clone()];
         let green = &mut irradiance.y[write.clone()];
         let blue = &mut irradiance.z[write];
         let lighting = density.lighting();
         let (center, normal, incoming) = (density.center, density.normal, density.incoming);
-        let (gu, gv, strength) =
-            (*lighting.u_gradient, *lighting.v_gradient, *lighting.strength);
+        let (gu, gv, strength) = (
+            *lighting.u_gradient,
+            *lighting.v_gradient,
+            *lighting.strength,
+        );
         for i in 0..count {
             let (dx, dy, dz) = (px[i] - center.x, py[i] - center.y, pz[i] - center.z);
             let u = dx * gu.x + dy * gu.y + dz * gu.z;

@@ -34,15 +34,15 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
     pub fn radiance(&self, receiver: &Receiver, rng: &mut CounterRng) -> Vec3 {
         let mut irradiance = Vec3::ZERO;
         for light in self.world.lights() {
-            irradiance += self.from_light(receiver, light);
+            irradiance += self.arriving_from(receiver, light);
         }
         for light in self.world.emitters() {
-            irradiance += self.from_area(receiver, light, rng);
+            irradiance += self.arriving_from_area(receiver, light, rng);
         }
         receiver.albedo * FRAC_1_PI * irradiance
     }
 
-    fn from_light(&self, receiver: &Receiver, light: &Light) -> Vec3 {
+    fn arriving_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
         let position = receiver.point.spawn.position;
         let (direction, distance, facing) = match *light {
             Light::Point { position: lamp, .. } | Light::Spot { position: lamp, .. } => {
@@ -52,9 +52,16 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
                     return Vec3::ZERO;
                 }
                 let direction = to_light / distance;
-                (direction, distance, light.intensity_towards(-direction) / (distance * distance))
+                (
+                    direction,
+                    distance,
+                    light.intensity_towards(-direction) / (distance * distance),
+                )
             }
-            Light::Directional { direction, irradiance } => (-direction, f32::INFINITY, irradiance),
+            Light::Directional {
+                direction,
+                irradiance,
+            } => (-direction, f32::INFINITY, irradiance),
             _ => return Vec3::ZERO,
         };
         let cosine = self.cosine(receiver, direction);
@@ -64,7 +71,12 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         cosine * facing
     }
 
-    fn from_area(&self, receiver: &Receiver, light: &AreaLight, rng: &mut CounterRng) -> Vec3 {
+    fn arriving_from_area(
+        &self,
+        receiver: &Receiver,
+        light: &AreaLight,
+        rng: &mut CounterRng,
+    ) -> Vec3 {
         let sample = rng.next_vec2();
         let (primitive, along) = light.choose(sample.x);
         let Some(on_light) = self.world.point_on(primitive, Vec2::new(along, sample.y)) else {
@@ -97,8 +109,16 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
     }
 
     fn is_blocked(&self, receiver: &Receiver, direction: Vec3, distance: f32) -> bool {
-        let origin = receiver.point.spawn.origin_towards(receiver.normal, direction);
-        let stop = if distance.is_finite() { distance * (1.0 - SHADOW_STOP) } else { distance };
-        self.intersect.is_occluded(&Ray::with_range(origin, direction, 0.0, stop))
+        let origin = receiver
+            .point
+            .spawn
+            .origin_towards(receiver.normal, direction);
+        let stop = if distance.is_finite() {
+            distance * (1.0 - SHADOW_STOP)
+        } else {
+            distance
+        };
+        self.intersect
+            .is_occluded(&Ray::with_range(origin, direction, 0.0, stop))
     }
 }

@@ -53,7 +53,13 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
     /// A tracer whose paths meet at most `max_depth` surfaces.
     #[must_use]
     pub fn new(world: &'a World, intersect: &'a I, max_depth: u32) -> Self {
-        Self { world, intersect, max_depth, pending: Vec::new(), rays: 0 }
+        Self {
+            world,
+            intersect,
+            max_depth,
+            pending: Vec::new(),
+            rays: 0,
+        }
     }
 
     /// Calls `visit` for each receiver that the path along `ray` reaches, and returns the radiance
@@ -99,7 +105,11 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
         branch.weight *= beer_lambert(branch.media.attenuation(self.world), hit.t);
         branch.depth += 1;
         let emits = point.from_outside || material.double_sided;
-        let emitted = if emits { branch.weight * material.emission } else { Vec3::ZERO };
+        let emitted = if emits {
+            branch.weight * material.emission
+        } else {
+            Vec3::ZERO
+        };
         match material.surface {
             Surface::Diffuse { albedo } => {
                 let side = if point.from_outside { 1.0 } else { -1.0 };
@@ -161,7 +171,9 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
                 }
                 weight /= survival;
             }
-            let origin = point.spawn.origin_towards(point.geometric_normal, outgoing.direction);
+            let origin = point
+                .spawn
+                .origin_towards(point.geometric_normal, outgoing.direction);
             self.pending.push(EyeBranch {
                 ray: Ray::new(origin, outgoing.direction),
                 weight,

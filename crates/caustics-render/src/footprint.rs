@@ -70,7 +70,11 @@ impl FootprintKernel {
     /// For the Gaussian it is that of the box as wide as the pixel. The others end sooner, and need
     /// more to reach a pixel's middle from wherever they stand.
     pub(crate) fn pixel_variance(self) -> f32 {
-        if self == Self::Gaussian { 1.0 / 12.0 } else { 0.25 }
+        if self == Self::Gaussian {
+            1.0 / 12.0
+        } else {
+            0.25
+        }
     }
 
     /// The extent of the kernel along each of its axes, for axes of one standard deviation.
@@ -93,7 +97,11 @@ impl FootprintKernel {
     /// direction.
     fn outer_reach(self) -> f32 {
         // The tent's corners lie beyond the ellipse.
-        if self == Self::Tent { SQRT_2 * self.reach() } else { self.reach() }
+        if self == Self::Tent {
+            SQRT_2 * self.reach()
+        } else {
+            self.reach()
+        }
     }
 
     /// The kernel at coordinates along its axes in standard deviations; its integral is 1.
@@ -151,7 +159,11 @@ pub struct FootprintOptions {
 
 impl Default for FootprintOptions {
     fn default() -> Self {
-        Self { kernel: FootprintKernel::Gaussian, scale: 0.55, max_anisotropy: f32::INFINITY }
+        Self {
+            kernel: FootprintKernel::Gaussian,
+            scale: 0.55,
+            max_anisotropy: f32::INFINITY,
+        }
     }
 }
 
@@ -165,7 +177,9 @@ impl FootprintOptions {
             return Err(RenderError::InvalidScale { scale: self.scale });
         }
         if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
-            return Err(RenderError::InvalidAnisotropy { max_anisotropy: self.max_anisotropy });
+            return Err(RenderError::InvalidAnisotropy {
+                max_anisotropy: self.max_anisotropy,
+            });
         }
         Ok(())
     }
@@ -223,7 +237,11 @@ impl Density {
             let largest = axis.abs().max_element();
             let is_long = largest > longest;
             shortened |= is_long;
-            if is_long { axis / largest * longest } else { axis }
+            if is_long {
+                axis / largest * longest
+            } else {
+                axis
+            }
         });
         let mut covariance = Covariance::of_axes(&axes, photon.normal, options);
         let widened = covariance.widen(bounds.least * bounds.least);
@@ -234,9 +252,15 @@ impl Density {
     /// This density blurred by a pixel whose edges on the receiver are `pixel`.
     pub(crate) fn blurred(&self, pixel: &[Vec3; 2]) -> Option<Self> {
         let (tangent, bitangent) = self.normal.any_orthonormal_pair();
-        let [[xx, _], [xy, yy]] =
-            [[self.axes[0].dot(tangent), 0.0], self.axes.map(|axis| axis.dot(bitangent))];
-        let mut covariance = Covariance { xx: xx * xx, xy: xx * xy, yy: xy * xy + yy * yy };
+        let [[xx, _], [xy, yy]] = [
+            [self.axes[0].dot(tangent), 0.0],
+            self.axes.map(|axis| axis.dot(bitangent)),
+        ];
+        let mut covariance = Covariance {
+            xx: xx * xx,
+            xy: xx * xy,
+            yy: xy * xy + yy * yy,
+        };
         covariance.add_pixel(pixel, self.normal, self.kernel);
         let cosine = (-self.incoming.dot(self.normal)).max(MIN_INCIDENCE);
         let beam = Beam {
@@ -249,7 +273,12 @@ impl Density {
     }
 
     fn spread(beam: &Beam, covariance: &Covariance, kernel: FootprintKernel) -> Option<Self> {
-        let Beam { center, normal, incoming, flux } = *beam;
+        let Beam {
+            center,
+            normal,
+            incoming,
+            flux,
+        } = *beam;
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let [[xx, _], [xy, yy]] = covariance.cholesky()?;
         let area = xx * yy;
@@ -257,8 +286,7 @@ impl Density {
         let mut v_gradient = (bitangent - (xy / xx) * tangent) / yy;
         let incidence = incoming.dot(normal);
         if incidence < -MIN_INCIDENCE {
-            let slide =
-                |gradient: Vec3| gradient - normal * (incoming.dot(gradient) / incidence);
+            let slide = |gradient: Vec3| gradient - normal * (incoming.dot(gradient) / incidence);
             (u_gradient, v_gradient) = (slide(u_gradient), slide(v_gradient));
         }
         let cosine = (-incidence).max(MIN_INCIDENCE);
@@ -295,11 +323,17 @@ impl Density {
         let flat = self.kernel.outer_reach() * deviation;
         let off = self.gate().reach;
         let incidence = self.incoming.dot(self.normal);
-        let along =
-            if incidence < -MIN_INCIDENCE { self.incoming / incidence } else { self.normal };
+        let along = if incidence < -MIN_INCIDENCE {
+            self.incoming / incidence
+        } else {
+            self.normal
+        };
         let rounding = 4.0 * f32::EPSILON * self.center.abs();
         let extent = flat + off * along.abs() + rounding;
-        Aabb { min: self.center - extent, max: self.center + extent }
+        Aabb {
+            min: self.center - extent,
+            max: self.center + extent,
+        }
     }
 
     /// Coordinates of a point, in standard deviations.
@@ -330,7 +364,10 @@ impl Density {
 
     /// What a displacement in the plane adds to the coordinates.
     pub(crate) fn along(&self, displacement: Vec3) -> [f32; 2] {
-        [displacement.dot(self.u_gradient), displacement.dot(self.v_gradient)]
+        [
+            displacement.dot(self.u_gradient),
+            displacement.dot(self.v_gradient),
+        ]
     }
 
     /// The kernel at coordinates in standard deviations.
@@ -381,8 +418,8 @@ impl Gate {
     pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
         let off = (point - density.center).dot(density.normal);
         let is_before = off >= 0.0 && off <= self.reach;
-        let is_beyond = off >= -self.plane_distance
-            && normal.dot(density.normal) >= self.normal_cosine;
+        let is_beyond =
+            off >= -self.plane_distance && normal.dot(density.normal) >= self.normal_cosine;
         is_before || (is_beyond && off < 0.0)
     }
 }
@@ -455,7 +492,11 @@ impl Covariance {
     fn add_pixel(&mut self, pixel: &[Vec3; 2], normal: Vec3, kernel: FootprintKernel) {
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         for axis in pixel {
-            self.add(kernel.pixel_variance(), axis.dot(tangent), axis.dot(bitangent));
+            self.add(
+                kernel.pixel_variance(),
+                axis.dot(tangent),
+                axis.dot(bitangent),
+            );
         }
     }
 
@@ -496,7 +537,11 @@ impl Covariance {
             self.xx += widened;
             self.yy += widened;
         } else if limit <= 1.0 {
-            *self = Self { xx: long, xy: 0.0, yy: long };
+            *self = Self {
+                xx: long,
+                xy: 0.0,
+                yy: long,
+            };
         }
     }
 
@@ -504,7 +549,11 @@ impl Covariance {
     fn rounded(&self) -> Self {
         let (short, long) = self.eigenvalues();
         let variance = (short * long).sqrt();
-        Self { xx: variance, xy: 0.0, yy: variance }
+        Self {
+            xx: variance,
+            xy: 0.0,
+            yy: variance,
+        }
     }
 
     /// The lower triangular matrix whose product with its transpose this is: `[[xx, 0], [xy, yy]]`.

@@ -67,13 +67,20 @@ struct Footprint {
 
 impl Footprint {
     fn new(density: Density) -> Self {
-        Self { gate: density.gate(), density }
+        Self {
+            gate: density.gate(),
+            density,
+        }
     }
 
     #[inline]
     fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
         let density = &self.density;
-        if self.gate.admits(density, position, normal) { density.irradiance(position, normal) } else { Vec3::ZERO }
+        if self.gate.admits(density, position, normal) {
+            density.irradiance(position, normal)
+        } else {
+            Vec3::ZERO
+        }
     }
 }
 
@@ -100,10 +107,16 @@ impl FootprintGather {
             stats.shortened += u64::from(adjustment.shortened);
             footprints.push(Footprint::new(density));
         }
-        let boxes: Vec<Aabb> =
-            footprints.iter().map(|footprint| footprint.density.bounds()).collect();
+        let boxes: Vec<Aabb> = footprints
+            .iter()
+            .map(|footprint| footprint.density.bounds())
+            .collect();
         let tree = BoxTree::new(&boxes)?;
-        let footprints = tree.order().iter().map(|&index| footprints[index as usize]).collect();
+        let footprints = tree
+            .order()
+            .iter()
+            .map(|&index| footprints[index as usize])
+            .collect();
         Ok(Self {
             tree,
             footprints,
@@ -119,11 +132,17 @@ impl FootprintGather {
     #[must_use]
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        self.tree.visit_overlapping(&Aabb { min: position, max: position }, |range| {
-            for footprint in &self.footprints[range] {
-                sum += footprint.irradiance(position, normal);
-            }
-        });
+        self.tree.visit_overlapping(
+            &Aabb {
+                min: position,
+                max: position,
+            },
+            |range| {
+                for footprint in &self.footprints[range] {
+                    sum += footprint.irradiance(position, normal);
+                }
+            },
+        );
         sum
     }
 
@@ -138,7 +157,10 @@ impl FootprintGather {
         let blur = self.kernel_reach
             * self.pixel_deviation
             * (a.length_squared() + b.length_squared()).sqrt();
-        let query = Aabb { min: position - blur, max: position + blur };
+        let query = Aabb {
+            min: position - blur,
+            max: position + blur,
+        };
         let mut sum = Vec3::ZERO;
         self.tree.visit_overlapping(&query, |range| {
             for footprint in &self.footprints[range] {
@@ -202,15 +224,27 @@ impl FootprintGather {
 
 fn is_finite(photon: &Photon) -> bool {
     let [a, b] = photon.axes;
-    [photon.position, photon.incoming, photon.flux, photon.normal, a, b]
-        .iter()
-        .all(|vector| vector.is_finite())
+    [
+        photon.position,
+        photon.incoming,
+        photon.flux,
+        photon.normal,
+        a,
+        b,
+    ]
+    .iter()
+    .all(|vector| vector.is_finite())
 }
 
 fn extent_bounds(photons: &[Photon], options: &FootprintOptions) -> ExtentBounds {
-    let around =
-        photons.iter().fold(Aabb::EMPTY, |bounds, photon| bounds.extend(photon.position));
-    let diagonal = if photons.is_empty() { 0.0 } else { around.diagonal().length() };
+    let around = photons
+        .iter()
+        .fold(Aabb::EMPTY, |bounds, photon| bounds.extend(photon.position));
+    let diagonal = if photons.is_empty() {
+        0.0
+    } else {
+        around.diagonal().length()
+    };
     let mut spacings: Vec<f32> = photons
         .iter()
         .map(|photon| {
@@ -228,8 +262,15 @@ fn extent_bounds(photons: &[Photon], options: &FootprintOptions) -> ExtentBounds
     };
     let least = LEAST_EXTENT * options.scale * close;
     let least = least.max(LEAST_OF_SCENE * diagonal);
-    let most = if diagonal > 0.0 { MOST_OF_SCENE * diagonal } else { MOST_METRES };
-    ExtentBounds { least: if least > 0.0 { least } else { 1e-3 }, most }
+    let most = if diagonal > 0.0 {
+        MOST_OF_SCENE * diagonal
+    } else {
+        MOST_METRES
+    };
+    ExtentBounds {
+        least: if least > 0.0 { least } else { 1e-3 },
+        most,
+    }
 }
 
 #[cfg(test)]
@@ -254,32 +295,50 @@ mod tests {
         let gather = FootprintGather::new(&[], &FootprintOptions::default()).unwrap();
         assert!(gather.is_empty());
         assert_eq!(gather.irradiance(Vec3::ZERO, Vec3::Y), Vec3::ZERO);
-        assert_eq!(gather.irradiance_over(Vec3::ZERO, Vec3::Y, [Vec3::X, Vec3::Z]), Vec3::ZERO);
+        assert_eq!(
+            gather.irradiance_over(Vec3::ZERO, Vec3::Y, [Vec3::X, Vec3::Z]),
+            Vec3::ZERO
+        );
     }
 
     #[test]
     fn the_middle_of_a_gaussian_has_its_flux_over_two_pi_times_its_variance() {
         let photons = [photon(Vec3::ONE, [0.2 * Vec3::X, 0.4 * Vec3::Z])];
-        let options = FootprintOptions { scale: 0.5, ..FootprintOptions::default() };
+        let options = FootprintOptions {
+            scale: 0.5,
+            ..FootprintOptions::default()
+        };
         let gather = FootprintGather::new(&photons, &options).unwrap();
         let cut_off = 1.0 - (-4.5f32).exp();
         let peak = 1.0 / (2.0 * std::f32::consts::PI * 0.1 * 0.2 * cut_off);
         let measured = gather.irradiance(Vec3::ONE, Vec3::Y);
-        assert!(measured.abs_diff_eq(peak * photons[0].flux, 1e-5 * peak), "{measured} {peak}");
+        assert!(
+            measured.abs_diff_eq(peak * photons[0].flux, 1e-5 * peak),
+            "{measured} {peak}"
+        );
     }
 
     #[test]
     fn numbers_that_are_not_finite_are_named() {
         let good = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
-        let bad = Photon { flux: Vec3::new(0.0, f32::NAN, 0.0), ..good };
+        let bad = Photon {
+            flux: Vec3::new(0.0, f32::NAN, 0.0),
+            ..good
+        };
         let result = FootprintGather::new(&[good, bad], &FootprintOptions::default());
-        assert_eq!(result.err(), Some(RenderError::NonFinitePhoton { photon: 1 }));
+        assert_eq!(
+            result.err(),
+            Some(RenderError::NonFinitePhoton { photon: 1 })
+        );
     }
 
     #[test]
     fn every_kernel_spreads_a_footprint_without_area() {
         for kernel in FootprintKernel::ALL {
-            let options = FootprintOptions { kernel, ..FootprintOptions::default() };
+            let options = FootprintOptions {
+                kernel,
+                ..FootprintOptions::default()
+            };
             let photons = [photon(Vec3::ZERO, [Vec3::ZERO; 2])];
             let gather = FootprintGather::new(&photons, &options).unwrap();
             assert_eq!(gather.stats().widened, 1);

@@ -54,8 +54,19 @@ impl GBuffer {
         width: u32,
         height: u32,
     ) -> Result<Self, RenderError> {
-        PictureOptions { width, height, ..PictureOptions::default() }.validate()?;
-        let looker = Looker { world, intersect, camera, width, height };
+        PictureOptions {
+            width,
+            height,
+            ..PictureOptions::default()
+        }
+        .validate()?;
+        let looker = Looker {
+            world,
+            intersect,
+            camera,
+            width,
+            height,
+        };
         let rows = in_rows(height, |y| looker.row(y));
         let centers: Vec<Option<Texel>> = rows.into_iter().flatten().collect();
         let refined = in_rows(height, |y| looker.refine_row(y, &centers));
@@ -115,7 +126,9 @@ struct Looker<'a, I: ?Sized> {
 
 impl<I: Intersect + ?Sized> Looker<'_, I> {
     fn row(&self, y: u32) -> Vec<Option<Texel>> {
-        (0..self.width).map(|x| self.look(x as f32 + 0.5, y as f32 + 0.5)).collect()
+        (0..self.width)
+            .map(|x| self.look(x as f32 + 0.5, y as f32 + 0.5))
+            .collect()
     }
 
     fn look(&self, x: f32, y: f32) -> Option<Texel> {

@@ -108,5 +108,5 @@ pub use footprint_gather::{FootprintGather, GatherStats};
 pub use gbuffer::{GBuffer, Texel};
 pub use glam;
 pub use nearest::{NearestEstimate, NearestOptions};
-pub use splat::{SplatStats, splat};
 pub use picture::{CausticSource, Picture, PictureOptions, Visibility, render};
+pub use splat::{SplatStats, splat};

@@ -1,6 +1,6 @@
 use std::f32::consts::FRAC_1_PI;
 
-use caustics_accel::{PhotonTree, NearestScratch};
+use caustics_accel::{NearestScratch, PhotonTree};
 use caustics_filter::Kernel;
 use caustics_trace::Photon;
 use glam::Vec3;
@@ -29,7 +29,11 @@ pub struct NearestOptions {
 
 impl Default for NearestOptions {
     fn default() -> Self {
-        Self { count: 50, max_radius: None, kernel: Kernel::Epanechnikov }
+        Self {
+            count: 50,
+            max_radius: None,
+            kernel: Kernel::Epanechnikov,
+        }
     }
 }
 
@@ -82,15 +86,19 @@ impl<'a> NearestEstimate<'a> {
                 && photon.incoming.dot(normal) < 0.0
                 && (photon.position - position).dot(normal).abs() < max_offset
         };
-        let found =
-            self.tree.nearest_where(position, self.count, self.max_radius, accept, scratch);
+        let found = self
+            .tree
+            .nearest_where(position, self.count, self.max_radius, accept, scratch);
         let Some(last) = found.last() else {
             return Vec3::ZERO;
         };
         // With too few photons in reach, the estimate covers the whole reach.
         let full = found.len() == self.count;
-        let radius_squared =
-            if full { last.distance_squared } else { self.max_radius * self.max_radius };
+        let radius_squared = if full {
+            last.distance_squared
+        } else {
+            self.max_radius * self.max_radius
+        };
         if radius_squared <= 0.0 {
             return Vec3::ZERO;
         }
@@ -125,5 +133,9 @@ fn default_radius(photons: &[Photon]) -> f32 {
         |(min, max), photon| (min.min(photon.position), max.max(photon.position)),
     );
     let diagonal = (max - min).length();
-    if diagonal.is_finite() && diagonal > 0.0 { diagonal / 20.0 } else { 1.0 }
+    if diagonal.is_finite() && diagonal > 0.0 {
+        diagonal / 20.0
+    } else {
+        1.0
+    }
 }

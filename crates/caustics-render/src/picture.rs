@@ -139,10 +139,18 @@ pub fn render<I: Intersect + ?Sized>(
     progress: &(dyn Fn(u32) + Sync),
 ) -> Result<Picture, RenderError> {
     options.validate()?;
-    let eye = camera.ray(0.5 * options.width as f32, 0.5 * options.height as f32, options.width, options.height);
+    let eye = camera.ray(
+        0.5 * options.width as f32,
+        0.5 * options.height as f32,
+        options.width,
+        options.height,
+    );
     // Footprints that the camera sees directly are splatted, not looked up pixel by pixel.
     let (seen_directly, gather) = match source {
-        CausticSource::Footprints { photons, options: footprints } => {
+        CausticSource::Footprints {
+            photons,
+            options: footprints,
+        } => {
             let buffer = GBuffer::new(world, intersect, camera, options.width, options.height)?;
             let (image, _) = splat(&buffer, photons, footprints)?;
             let gather = match options.visibility {
@@ -231,7 +239,11 @@ impl<I: Intersect + ?Sized> RowRenderer<'_, I> {
         let mut eye = EyeTracer::new(self.world, self.intersect, options.max_depth);
         let direct_light = DirectLight::new(self.world, self.intersect);
         let mut scratch = NearestScratch::new();
-        let mut row = Row { direct: Vec::new(), caustics: Vec::new(), rays: 0 };
+        let mut row = Row {
+            direct: Vec::new(),
+            caustics: Vec::new(),
+            rays: 0,
+        };
         for x in 0..options.width {
             let pixel = u64::from(y) * u64::from(options.width) + u64::from(x);
             let mut rng = CounterRng::new(options.seed, pixel);

@@ -47,7 +47,11 @@ impl Screen {
 
     /// The cosine between a surface's normal and the direction to the eye, up to a positive factor.
     pub(crate) fn facing(&self, point: Vec3, normal: Vec3) -> f32 {
-        let view = if self.is_perspective { point - self.eye } else { self.forward };
+        let view = if self.is_perspective {
+            point - self.eye
+        } else {
+            self.forward
+        };
         -view.dot(normal)
     }
 
@@ -58,7 +62,11 @@ impl Screen {
         if depth <= 0.0 {
             return None;
         }
-        let scale = if self.is_perspective { depth.recip() } else { 1.0 };
+        let scale = if self.is_perspective {
+            depth.recip()
+        } else {
+            1.0
+        };
         let pixel = Vec2::new(
             relative.dot(self.step_x) / self.step_x.length_squared(),
             relative.dot(self.step_y) / self.step_y.length_squared(),
@@ -97,7 +105,10 @@ mod tests {
         let orthographic = Camera::new(
             "o",
             perspective.transform,
-            Projection::Orthographic { xmag: 2.0, ymag: 1.5 },
+            Projection::Orthographic {
+                xmag: 2.0,
+                ymag: 1.5,
+            },
         )
         .unwrap();
         [perspective, orthographic]

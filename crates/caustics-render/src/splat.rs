@@ -5,9 +5,9 @@ use std::f32::consts::FRAC_1_PI;
 use std::ops::Range;
 
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
+use crate::error::RenderError;
 use crate::footprint::{Density, FootprintOptions, Gate};
 use crate::gbuffer::{GBuffer, Texel};
-use crate::error::RenderError;
 use crate::screen::Screen;
 
 /// Rows of one task.
@@ -123,7 +123,10 @@ fn prepare(photons: &[Photon], screen: &Screen, options: &FootprintOptions) -> V
             .collect()
     }
     #[cfg(not(feature = "parallel"))]
-    photons.iter().map(|photon| Splat::prepare(photon, screen, options)).collect()
+    photons
+        .iter()
+        .map(|photon| Splat::prepare(photon, screen, options))
+        .collect()
 }
 
 impl Splat {
@@ -142,9 +145,12 @@ impl Splat {
         let steps = pixel.map(|[x, y]| [density.along(x), density.along(y)].map(Vec2::from));
         let center = screen.project(photon.position);
         let is_local = bounds.is_exact && steps.is_some() && center.is_some();
-        let ([step_x, step_y], center) =
-            (steps.unwrap_or_default(), center.unwrap_or_default());
-        let sigma = if is_local { least_sigma(step_x, step_y) } else { f32::INFINITY };
+        let ([step_x, step_y], center) = (steps.unwrap_or_default(), center.unwrap_or_default());
+        let sigma = if is_local {
+            least_sigma(step_x, step_y)
+        } else {
+            f32::INFINITY
+        };
         if sigma < SMALL_SIGMA {
             density.scale_by(normalisation(&density, center, step_x, step_y));
         }
@@ -215,7 +221,10 @@ impl Splat {
     /// What the photon adds to the irradiance of a texel.
     #[inline]
     fn irradiance(&self, texel: &Texel) -> Vec3 {
-        if self.gate.admits(&self.density, texel.position, texel.normal) {
+        if self
+            .gate
+            .admits(&self.density, texel.position, texel.normal)
+        {
             self.density.irradiance(texel.position, texel.normal)
         } else {
             Vec3::ZERO
@@ -226,7 +235,11 @@ impl Splat {
 /// The smallest standard deviation across the screen, in pixels.
 fn least_sigma(step_x: Vec2, step_y: Vec2) -> f32 {
     // The largest singular value of the steps is one over it.
-    let (xx, yy, xy) = (step_x.length_squared(), step_y.length_squared(), step_x.dot(step_y));
+    let (xx, yy, xy) = (
+        step_x.length_squared(),
+        step_y.length_squared(),
+        step_x.dot(step_y),
+    );
     let mean = 0.5 * (xx + yy);
     let half = 0.5 * (xx - yy);
     (mean + (half * half + xy * xy).sqrt()).sqrt().recip()
@@ -285,7 +298,11 @@ impl Bounds {
             };
         }
         let high = Vec2::new(screen.width as f32, screen.height as f32);
-        Self { low: Vec2::ZERO, high, is_exact: false }
+        Self {
+            low: Vec2::ZERO,
+            high,
+            is_exact: false,
+        }
     }
 
     fn clipped(self, screen: &Screen) -> Option<Self> {
@@ -309,10 +326,17 @@ struct Level {
 }
 
 impl Level {
-    fn new(width: usize, height: usize, texels: Vec<Option<Texel>>, extras: Vec<(u32, Texel)>) -> Self {
+    fn new(
+        width: usize,
+        height: usize,
+        texels: Vec<Option<Texel>>,
+        extras: Vec<(u32, Texel)>,
+    ) -> Self {
         let bands = height.div_ceil(BAND);
         let extra_starts = (0..=bands)
-            .map(|band| extras.partition_point(|&(pixel, _)| (pixel as usize) < band * BAND * width))
+            .map(|band| {
+                extras.partition_point(|&(pixel, _)| (pixel as usize) < band * BAND * width)
+            })
             .collect();
         Self {
             width,
@@ -352,7 +376,9 @@ impl Level {
                     let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
                     Some((off, texel))
                 });
-                inside.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, texel)| texel)
+                inside
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+                    .map(|(_, texel)| texel)
             })
             .collect();
         Self::new(width, height, texels, Vec::new())
@@ -393,7 +419,11 @@ impl Level {
         #[cfg(feature = "parallel")]
         let deposited: Vec<DVec3> = {
             use rayon::prelude::*;
-            tasks.into_par_iter().with_max_len(1).map(|task| task.run(prepared)).collect()
+            tasks
+                .into_par_iter()
+                .with_max_len(1)
+                .map(|task| task.run(prepared))
+                .collect()
         };
         #[cfg(not(feature = "parallel"))]
         let deposited: Vec<DVec3> = tasks.into_iter().map(|task| task.run(prepared)).collect();
@@ -422,7 +452,12 @@ impl Level {
     }
 
     fn is_dark(&self) -> bool {
-        self.irradiance.x.iter().chain(&self.irradiance.y).chain(&self.irradiance.z).all(|&it| it == 0.0)
+        self.irradiance
+            .x
+            .iter()
+            .chain(&self.irradiance.y)
+            .chain(&self.irradiance.z)
+            .all(|&it| it == 0.0)
     }
 
     /// The irradiance between the middles of pixels, from those that see the same surface.
@@ -439,7 +474,9 @@ impl Level {
                         continue;
                     }
                     let index = y as usize * self.width + x as usize;
-                    let Some(other) = &self.texels[index] else { continue };
+                    let Some(other) = &self.texels[index] else {
+                        continue;
+                    };
                     if !texel.is_like(other) {
                         continue;
                     }
@@ -489,7 +526,9 @@ impl BandTask<'_> {
         let rows = self.irradiance.x.len() / self.width;
         let deposited = DVec3::ZERO;
         for &index in self.splats {
-            let Prepared::Splat(splat) = &prepared[index as usize] else { continue };
+            let Prepared::Splat(splat) = &prepared[index as usize] else {
+                continue;
+            };
             let first = usize::from(splat.rows[0]).max(self.first_row);
             let last = usize::from(splat.rows[1]).min(self.first_row + rows);
             for row in first..last {

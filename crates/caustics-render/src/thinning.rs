@@ -47,7 +47,10 @@ pub(crate) fn thin_wide(
                 return None;
             }
             due -= 1.0;
-            Some(Photon { flux: photon.flux / survival, ..*photon })
+            Some(Photon {
+                flux: photon.flux / survival,
+                ..*photon
+            })
         })
         .collect()
 }
@@ -57,13 +60,18 @@ pub(crate) fn thin_wide(
 fn busy_area(photons: &[Photon]) -> f32 {
     let stride = photons.len().div_ceil(SAMPLES).max(1);
     let size = [0, 1, 2].map(|axis| {
-        let mut places: Vec<f32> =
-            photons.iter().step_by(stride).map(|photon| photon.position[axis]).collect();
+        let mut places: Vec<f32> = photons
+            .iter()
+            .step_by(stride)
+            .map(|photon| photon.position[axis])
+            .collect();
         places.sort_by(f32::total_cmp);
         let at = |part: usize| places.get(places.len() * part / 10).copied().unwrap_or(0.0);
         at(9) - at(1)
     });
-    (size[0] * size[1]).max(size[1] * size[2]).max(size[2] * size[0])
+    (size[0] * size[1])
+        .max(size[1] * size[2])
+        .max(size[2] * size[0])
 }
 
 /// The largest area to which all larger ones may be cut so that their sum is at most `budget`.
@@ -123,11 +131,19 @@ mod tests {
         let is_wide = |photon: &&Photon| photon.axes[0].x > 1.0;
         // Narrow footprints stay as they are.
         assert_eq!(thinned.iter().filter(|it| !is_wide(it)).count(), 5000);
-        assert!(thinned.iter().filter(|it| !is_wide(it)).all(|it| it.flux.x == 1.0));
+        assert!(
+            thinned
+                .iter()
+                .filter(|it| !is_wide(it))
+                .all(|it| it.flux.x == 1.0)
+        );
         let wide = thinned.iter().filter(is_wide).count();
         assert!((20..200).contains(&wide), "{wide}");
         let flux: f32 = thinned.iter().map(|photon| photon.flux.x).sum();
-        let largest = thinned.iter().map(|photon| photon.flux.x).fold(0.0, f32::max);
+        let largest = thinned
+            .iter()
+            .map(|photon| photon.flux.x)
+            .fold(0.0, f32::max);
         assert!((flux - 10_000.0).abs() <= largest, "{flux}");
     }
 

@@ -34,7 +34,10 @@ impl Casters {
         let mut spheres = Vec::new();
         let mut is_used = vec![false; world.positions().len()];
         for object in world.objects() {
-            if !world.materials()[object.material as usize].surface.is_specular() {
+            if !world.materials()[object.material as usize]
+                .surface
+                .is_specular()
+            {
                 continue;
             }
             let triangles = object.triangles.start as usize..object.triangles.end as usize;
@@ -52,9 +55,19 @@ impl Casters {
         let center = world.specular_bounds().center();
         let reach = |point: &Vec3| point.distance(center);
         let farthest = vertices.iter().map(reach).fold(0.0, f32::max);
-        let radius = spheres.iter().map(|it| reach(&it.center) + it.radius).fold(farthest, f32::max);
-        let bounding = Sphere { center, radius: radius * (1.0 + MARGIN) };
-        Some(Self { vertices, spheres, bounding })
+        let radius = spheres
+            .iter()
+            .map(|it| reach(&it.center) + it.radius)
+            .fold(farthest, f32::max);
+        let bounding = Sphere {
+            center,
+            radius: radius * (1.0 + MARGIN),
+        };
+        Some(Self {
+            vertices,
+            spheres,
+            bounding,
+        })
     }
 
     /// A sphere that holds everything.
@@ -127,7 +140,14 @@ impl Casters {
     /// Some of the vertices, and the outermost points of the spheres.
     fn sampled(&self) -> impl Iterator<Item = Vec3> {
         let stride = self.vertices.len().div_ceil(SHAPE_VERTICES).max(1);
-        let poles = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+        let poles = [
+            Vec3::X,
+            Vec3::Y,
+            Vec3::Z,
+            Vec3::NEG_X,
+            Vec3::NEG_Y,
+            Vec3::NEG_Z,
+        ];
         let around = self
             .spheres
             .iter()
@@ -139,10 +159,13 @@ impl Casters {
 /// The box around points in a frame turned by `turn` radians.
 fn extent(points: impl Iterator<Item = Vec2>, turn: f32) -> (Vec2, Vec2) {
     let axes = Vec2::from_angle(turn);
-    points.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), point| {
-        let turned = turned_back(axes, point);
-        (low.min(turned), high.max(turned))
-    })
+    points.fold(
+        (Vec2::INFINITY, Vec2::NEG_INFINITY),
+        |(low, high), point| {
+            let turned = turned_back(axes, point);
+            (low.min(turned), high.max(turned))
+        },
+    )
 }
 
 /// A point rotated by the opposite of the angle of the unit vector `axes`.

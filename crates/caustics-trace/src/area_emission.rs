@@ -34,7 +34,12 @@ impl<'a> AreaDomain<'a> {
         front: bool,
         target: Option<Sphere>,
     ) -> Self {
-        Self { world, light, front, target }
+        Self {
+            world,
+            light,
+            front,
+            target,
+        }
     }
 
     /// A point just above the surface.
@@ -47,9 +52,12 @@ impl<'a> AreaDomain<'a> {
 
     pub(crate) fn emit<const N: usize>(&self, sample: &EmissionSample) -> Option<Emission<N>> {
         let (primitive, along) = self.light.choose(sample.place.x);
-        let point = self.world.point_on(primitive, Vec2::new(along, sample.place.y))?;
+        let point = self
+            .world
+            .point_on(primitive, Vec2::new(along, sample.place.y))?;
         let normal = self.emitting_side(point.geometric_normal);
-        let (direction, solid_angle) = self.direction(point.spawn.position, normal, sample.point)?;
+        let (direction, solid_angle) =
+            self.direction(point.spawn.position, normal, sample.point)?;
         let cosine = direction.dot(normal);
         if cosine <= 0.0 {
             return None;
@@ -77,7 +85,10 @@ impl<'a> AreaDomain<'a> {
     fn direction(&self, origin: Vec3, normal: Vec3, sample: Vec2) -> Option<(Vec3, f32)> {
         if let Some((axis, cone)) = self.cone(origin) {
             let local = cone.sample_concentric(sample).value;
-            return Some((Frame::from_normal(axis).to_world(local).normalize(), cone.solid_angle()));
+            return Some((
+                Frame::from_normal(axis).to_world(local).normalize(),
+                cone.solid_angle(),
+            ));
         }
         let local = square_to_cosine_hemisphere(sample).value;
         let solid_angle = PI / local.z;
@@ -92,7 +103,9 @@ impl<'a> AreaDomain<'a> {
         if distance <= sphere.radius {
             return None;
         }
-        Cone::from_sine(sphere.radius / distance).ok().map(|cone| (to_sphere / distance, cone))
+        Cone::from_sine(sphere.radius / distance)
+            .ok()
+            .map(|cone| (to_sphere / distance, cone))
     }
 
     /// How far apart the photons stand in position and in direction, in metres and in radians.
@@ -102,12 +115,22 @@ impl<'a> AreaDomain<'a> {
     /// as wide as the spacing of directions is at the target.
     fn spacings(&self, solid_angle: f32, origin: Vec3, share: f32) -> [f32; 2] {
         let area = self.light.area();
-        let distance = self.target.map_or(0.0, |sphere| sphere.center.distance(origin));
+        let distance = self
+            .target
+            .map_or(0.0, |sphere| sphere.center.distance(origin));
         let across_target = solid_angle * distance * distance;
         let balanced = (area / (across_target * share)).sqrt();
         // As if from so many places on the light, each with so many directions.
-        let places = if balanced.is_finite() { balanced } else { share.sqrt().recip() };
+        let places = if balanced.is_finite() {
+            balanced
+        } else {
+            share.sqrt().recip()
+        };
         let places = places.clamp(1.0, share.recip());
-        [(area / places).sqrt(), (solid_angle * places * share).sqrt()].map(|it| NARROWING * it)
+        [
+            (area / places).sqrt(),
+            (solid_angle * places * share).sqrt(),
+        ]
+        .map(|it| NARROWING * it)
     }
 }

@@ -63,9 +63,19 @@ enum Domain<'a> {
     /// All directions from a point.
     Sphere { light: &'a Light, origin: Vec3 },
     /// Directions from a point around an axis.
-    Cone { light: &'a Light, origin: Vec3, frame: Frame, cone: Cone },
+    Cone {
+        light: &'a Light,
+        origin: Vec3,
+        frame: Frame,
+        cone: Cone,
+    },
     /// Parallel rays from a rectangle across them.
-    Rectangle { corner: Vec3, edges: [Vec3; 2], direction: Vec3, irradiance: Vec3 },
+    Rectangle {
+        corner: Vec3,
+        edges: [Vec3; 2],
+        direction: Vec3,
+        irradiance: Vec3,
+    },
     /// Rays from a side of a surface.
     Area(AreaDomain<'a>),
     /// No rays: the light cannot reach what it is aimed at.
@@ -81,8 +91,11 @@ impl<'a> Emitter<'a> {
             Aim::Everywhere => Target::Everything,
             Aim::Casters => Casters::of(world).map_or(Target::Nothing, Target::Casters),
         };
-        let mut emitters: Vec<Self> =
-            world.lights().iter().map(|light| Self::of_light(world, light, &target)).collect();
+        let mut emitters: Vec<Self> = world
+            .lights()
+            .iter()
+            .map(|light| Self::of_light(world, light, &target))
+            .collect();
         for light in world.emitters() {
             emitters.push(Self::of_area(world, light, true, &target));
             if light.double_sided() {
@@ -108,13 +121,20 @@ impl<'a> Emitter<'a> {
     /// On how many parameters its photons depend: 2 or 4.
     #[must_use]
     pub fn dimensions(&self) -> usize {
-        if matches!(self.domain, Domain::Area(_)) { 4 } else { 2 }
+        if matches!(self.domain, Domain::Area(_)) {
+            4
+        } else {
+            2
+        }
     }
 
     /// How many times as long along its first parameter the domain is as along its second.
     pub(crate) fn aspect(&self) -> f32 {
         match &self.domain {
-            Domain::Rectangle { edges: [along, across], .. } => along.length() / across.length(),
+            Domain::Rectangle {
+                edges: [along, across],
+                ..
+            } => along.length() / across.length(),
             _ => 1.0,
         }
     }
@@ -143,7 +163,12 @@ impl<'a> Emitter<'a> {
                 let solid_angle = 4.0 * std::f32::consts::PI;
                 from_point(light, *origin, &warped, solid_angle * share, sample)
             }
-            Domain::Cone { light, origin, frame, cone } => {
+            Domain::Cone {
+                light,
+                origin,
+                frame,
+                cone,
+            } => {
                 let local = cone.sample_concentric(sample.point);
                 let warped = WarpSample {
                     value: frame.to_world(local.value),
@@ -153,7 +178,12 @@ impl<'a> Emitter<'a> {
                 };
                 from_point(light, *origin, &warped, cone.solid_angle() * share, sample)
             }
-            Domain::Rectangle { corner, edges, direction, irradiance } => {
+            Domain::Rectangle {
+                corner,
+                edges,
+                direction,
+                irradiance,
+            } => {
                 let [along, across] = *edges;
                 let origin = corner + sample.point.x * along + sample.point.y * across;
                 let area = along.length() * across.length();
@@ -173,9 +203,10 @@ impl<'a> Emitter<'a> {
 
     fn of_light(world: &World, light: &'a Light, target: &Target) -> Self {
         match *light {
-            Light::Directional { direction, irradiance } => {
-                Self::of_sun(world, direction, irradiance, target)
-            }
+            Light::Directional {
+                direction,
+                irradiance,
+            } => Self::of_sun(world, direction, irradiance, target),
             _ => Self::of_lamp(light, target),
         }
     }
@@ -208,7 +239,12 @@ impl<'a> Emitter<'a> {
         };
         let aimed_power = flux(&edges);
         Self {
-            domain: Domain::Rectangle { corner, edges, direction, irradiance },
+            domain: Domain::Rectangle {
+                corner,
+                edges,
+                direction,
+                irradiance,
+            },
             power: power.max(aimed_power),
             aimed_power,
         }
@@ -219,9 +255,17 @@ impl<'a> Emitter<'a> {
         // A spot light's own cone; its constructor keeps the cosine in 0..1.
         let (origin, own) = match *light {
             Light::Point { position, .. } => (position, None),
-            Light::Spot { position, direction, outer_cos, .. } => {
-                (position, Cone::from_cosine(outer_cos).ok().map(|cone| (direction, cone)))
-            }
+            Light::Spot {
+                position,
+                direction,
+                outer_cos,
+                ..
+            } => (
+                position,
+                Cone::from_cosine(outer_cos)
+                    .ok()
+                    .map(|cone| (direction, cone)),
+            ),
             _ => return Self::nothing(power),
         };
         let around = match target {
@@ -236,17 +280,29 @@ impl<'a> Emitter<'a> {
                     return Self::nothing(power);
                 }
                 let aimed = around.solid_angle() < own.solid_angle();
-                Some(if aimed { (towards, around) } else { (axis, own) })
+                Some(if aimed {
+                    (towards, around)
+                } else {
+                    (axis, own)
+                })
             }
             (own, around) => own.or(around),
         };
         let domain = match narrower {
-            Some((axis, cone)) => {
-                Domain::Cone { light, origin, frame: Frame::from_normal(axis), cone }
-            }
+            Some((axis, cone)) => Domain::Cone {
+                light,
+                origin,
+                frame: Frame::from_normal(axis),
+                cone,
+            },
             None => Domain::Sphere { light, origin },
         };
-        Self { domain, power, aimed_power: DVec3::ZERO }.measured()
+        Self {
+            domain,
+            power,
+            aimed_power: DVec3::ZERO,
+        }
+        .measured()
     }
 
     fn of_area(world: &'a World, light: &'a AreaLight, front: bool, target: &Target) -> Self {
@@ -258,11 +314,20 @@ impl<'a> Emitter<'a> {
             Target::Casters(casters) => Some(*casters.bounding()),
         };
         let domain = Domain::Area(AreaDomain::new(world, light, front, aimed_at));
-        Self { domain, power, aimed_power: DVec3::ZERO }.measured()
+        Self {
+            domain,
+            power,
+            aimed_power: DVec3::ZERO,
+        }
+        .measured()
     }
 
     fn nothing(power: DVec3) -> Self {
-        Self { domain: Domain::Nothing, power, aimed_power: DVec3::ZERO }
+        Self {
+            domain: Domain::Nothing,
+            power,
+            aimed_power: DVec3::ZERO,
+        }
     }
 
     /// Measures the flux into the domain by a fixed set of photons: good enough to share the
@@ -300,7 +365,9 @@ fn from_point<const N: usize>(
         flux,
         differential: differential(
             &[],
-            &sample.spacing.map(|edge| edge.x * warped.d_du + edge.y * warped.d_dv),
+            &sample
+                .spacing
+                .map(|edge| edge.x * warped.d_du + edge.y * warped.d_dv),
         ),
     })
 }
@@ -315,7 +382,12 @@ pub(crate) fn differential<const N: usize>(
     for (slot, &change) in result.direction.iter_mut().zip(directions) {
         *slot = change;
     }
-    for (slot, &moved) in result.position.iter_mut().skip(directions.len()).zip(positions) {
+    for (slot, &moved) in result
+        .position
+        .iter_mut()
+        .skip(directions.len())
+        .zip(positions)
+    {
         *slot = moved;
     }
     result

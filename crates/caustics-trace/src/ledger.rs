@@ -174,8 +174,9 @@ impl EnergyLedger {
             mine.retract(theirs);
         }
         self.normal_fallbacks = self.normal_fallbacks.saturating_sub(other.normal_fallbacks);
-        self.bounded_differentials =
-            self.bounded_differentials.saturating_sub(other.bounded_differentials);
+        self.bounded_differentials = self
+            .bounded_differentials
+            .saturating_sub(other.bounded_differentials);
         self.rays += other.rays;
     }
 

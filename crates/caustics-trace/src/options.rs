@@ -72,7 +72,10 @@ pub struct Refinement {
 
 impl Default for Refinement {
     fn default() -> Self {
-        Self { levels: 0, detail: 1.0 / 1000.0 }
+        Self {
+            levels: 0,
+            detail: 1.0 / 1000.0,
+        }
     }
 }
 
@@ -98,13 +101,19 @@ impl TraceOptions {
     /// A weight out of range, or a depth at which no photon could be stored.
     pub fn validate(&self) -> Result<(), TraceError> {
         if !(0.0..=1.0).contains(&self.min_weight) {
-            return Err(TraceError::MinWeight { min_weight: self.min_weight });
+            return Err(TraceError::MinWeight {
+                min_weight: self.min_weight,
+            });
         }
         if !(self.refinement.detail >= 0.0 && self.refinement.detail.is_finite()) {
-            return Err(TraceError::Detail { detail: self.refinement.detail });
+            return Err(TraceError::Detail {
+                detail: self.refinement.detail,
+            });
         }
         if self.max_depth < 2 {
-            return Err(TraceError::MaxDepth { max_depth: self.max_depth });
+            return Err(TraceError::MaxDepth {
+                max_depth: self.max_depth,
+            });
         }
         Ok(())
     }

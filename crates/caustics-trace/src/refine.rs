@@ -104,8 +104,17 @@ struct Blocks {
 }
 
 /// The steps to a cell itself and to its eight neighbours.
-const NEIGHBOURHOOD: [(i32, i32); 9] =
-    [(-1, -1), (0, -1), (1, -1), (-1, 0), (0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+const NEIGHBOURHOOD: [(i32, i32); 9] = [
+    (-1, -1),
+    (0, -1),
+    (1, -1),
+    (-1, 0),
+    (0, 0),
+    (1, 0),
+    (-1, 1),
+    (0, 1),
+    (1, 1),
+];
 
 /// No block.
 const NONE: u32 = u32::MAX;
@@ -118,7 +127,11 @@ impl Level {
     ) -> Self {
         let columns = resolution.x;
         let first = (0..cells.len() as u32).collect();
-        let blocks = Blocks { columns, division: 1, first };
+        let blocks = Blocks {
+            columns,
+            division: 1,
+            first,
+        };
         Self::trace_blocks(batch, resolution, cells, blocks)
     }
 
@@ -148,7 +161,9 @@ impl Level {
         };
         for mut part in parts {
             let base = level.photons.len();
-            level.starts.extend(part.starts.iter().map(|start| base + start));
+            level
+                .starts
+                .extend(part.starts.iter().map(|start| base + start));
             level.photons.append(&mut part.photons);
             level.paths.append(&mut part.paths);
             level.ledger.merge(&part.ledger);
@@ -165,7 +180,10 @@ impl Level {
     fn cell_at(&self, place: UVec2) -> Option<usize> {
         let division = self.blocks.division;
         let block = place / division;
-        let first = *self.blocks.first.get((block.y * self.blocks.columns + block.x) as usize)?;
+        let first = *self
+            .blocks
+            .first
+            .get((block.y * self.blocks.columns + block.x) as usize)?;
         let within = place % division;
         (first != NONE).then(|| (first + within.y * division + within.x) as usize)
     }
@@ -179,14 +197,20 @@ impl Level {
                 if next.x >= self.resolution.x || next.y >= self.resolution.y {
                     continue;
                 }
-                let Some(neighbour) = self.cell_at(next) else { continue };
+                let Some(neighbour) = self.cell_at(next) else {
+                    continue;
+                };
                 let score = self.mismatch(cell, neighbour, axis, 1.0, detail)
                     + self.mismatch(neighbour, cell, axis, -1.0, detail);
                 scores[cell] += score;
                 scores[neighbour] += score;
             }
         }
-        scores.into_iter().enumerate().filter(|&(_, score)| score > 0.0).collect()
+        scores
+            .into_iter()
+            .enumerate()
+            .filter(|&(_, score)| score > 0.0)
+            .collect()
     }
 
     /// The flagged cells and all around them, in their order, as many as there is room for: those
@@ -208,7 +232,9 @@ impl Level {
                 is_divided[it] = true;
             }
         }
-        (0..self.cells.len()).filter(|&cell| is_divided[cell]).collect()
+        (0..self.cells.len())
+            .filter(|&cell| is_divided[cell])
+            .collect()
     }
 
     /// A cell and those of its eight neighbours that this level has.
@@ -257,8 +283,10 @@ impl Level {
     /// how wide they are spread.
     fn mismatch(&self, cell: usize, neighbour: usize, axis: usize, sign: f32, detail: f32) -> f32 {
         let own = self.photons_of(cell);
-        let brightest =
-            self.photons[own.clone()].iter().map(|it| it.flux.max_element()).fold(0.0, f32::max);
+        let brightest = self.photons[own.clone()]
+            .iter()
+            .map(|it| it.flux.max_element())
+            .fold(0.0, f32::max);
         let mut score = 0.0;
         for index in own {
             let photon = &self.photons[index];
@@ -280,11 +308,7 @@ impl Level {
     }
 
     /// Traces the sub-cells of some cells.
-    fn divide<I: Intersect + ?Sized>(
-        &self,
-        batch: &Batch<'_, I>,
-        divided: &[usize],
-    ) -> Self {
+    fn divide<I: Intersect + ?Sized>(&self, batch: &Batch<'_, I>, divided: &[usize]) -> Self {
         let division = DIVISION;
         let mut first = vec![NONE; (self.resolution.x * self.resolution.y) as usize];
         let mut cells = Vec::with_capacity(divided.len() * (division * division) as usize);
@@ -297,7 +321,11 @@ impl Level {
                 }
             }
         }
-        let blocks = Blocks { columns: self.resolution.x, division, first };
+        let blocks = Blocks {
+            columns: self.resolution.x,
+            division,
+            first,
+        };
         Self::trace_blocks(batch, self.resolution * division, cells, blocks)
     }
 
@@ -311,7 +339,8 @@ impl Level {
         // What the divided cells' photons did is undone in the ledger; their rays were traced.
         let places: Vec<UVec2> = divided.iter().map(|&cell| self.cells[cell]).collect();
         for chunk in places.chunks(CHUNK) {
-            self.ledger.retract(&trace_cells(batch, self.resolution, chunk).ledger);
+            self.ledger
+                .retract(&trace_cells(batch, self.resolution, chunk).ledger);
         }
         map.ledger.merge(&self.ledger);
         let mut next = divided.iter().peekable();
@@ -357,7 +386,11 @@ fn trace_cells<I: Intersect + ?Sized>(
 ) -> Part {
     let mut tracer = PathTracer::<I, 2>::new(batch.world, batch.intersect, batch.options);
     let seed = batch.options.seed;
-    let place = if seed == 0 { Vec2::splat(0.5) } else { CounterRng::new(seed, 0).next_vec2() };
+    let place = if seed == 0 {
+        Vec2::splat(0.5)
+    } else {
+        CounterRng::new(seed, 0).next_vec2()
+    };
     let size = resolution.as_vec2().recip();
     let mut starts = Vec::with_capacity(cells.len());
     for &cell in cells {
@@ -375,5 +408,10 @@ fn trace_cells<I: Intersect + ?Sized>(
             tracer.trace(&emission, batch.media, &mut rng);
         }
     }
-    Part { photons: tracer.photons, paths: tracer.paths, starts, ledger: tracer.ledger }
+    Part {
+        photons: tracer.photons,
+        paths: tracer.paths,
+        starts,
+        ledger: tracer.ledger,
+    }
 }

@@ -33,10 +33,18 @@ pub fn trace_photons<I: Intersect + ?Sized>(
     let mut map = PhotonMap::default();
     let mut first = 0u32;
     for (emitter, &count) in emitters.iter().zip(&counts) {
-        let media = emitter
-            .start()
-            .map_or(MediumStack::EMPTY, |start| MediumStack::at(world, intersect, start));
-        let batch = Batch { world, intersect, options, emitter, media, first, count };
+        let media = emitter.start().map_or(MediumStack::EMPTY, |start| {
+            MediumStack::at(world, intersect, start)
+        });
+        let batch = Batch {
+            world,
+            intersect,
+            options,
+            emitter,
+            media,
+            first,
+            count,
+        };
         let before = map.ledger.emitted().flux;
         if batch.is_refined() {
             let levels = options.refinement.levels;
@@ -58,9 +66,14 @@ pub fn trace_photons<I: Intersect + ?Sized>(
 
 /// How many of `total` photons each emitter gets.
 fn share(emitters: &[Emitter<'_>], total: u32) -> Vec<u32> {
-    let weights: Vec<f64> = emitters.iter().map(|it| it.aimed_power().element_sum()).collect();
-    apportion(&weights, total as usize)
-        .map_or_else(|_| vec![0; emitters.len()], |counts| counts.into_iter().map(|it| it as u32).collect())
+    let weights: Vec<f64> = emitters
+        .iter()
+        .map(|it| it.aimed_power().element_sum())
+        .collect();
+    apportion(&weights, total as usize).map_or_else(
+        |_| vec![0; emitters.len()],
+        |counts| counts.into_iter().map(|it| it as u32).collect(),
+    )
 }
 
 /// The photons of one emitter.
@@ -102,7 +115,8 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
         #[cfg(not(feature = "parallel"))]
         let parts: Vec<PhotonMap> = (0..chunks).map(run).collect();
 
-        map.photons.reserve(parts.iter().map(|part| part.photons.len()).sum());
+        map.photons
+            .reserve(parts.iter().map(|part| part.photons.len()).sum());
         for mut part in parts {
             map.photons.append(&mut part.photons);
             map.ledger.merge(&part.ledger);
@@ -120,6 +134,9 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
             let mut rng = CounterRng::new(self.options.seed, u64::from(self.first + index));
             tracer.trace(&emission, self.media, &mut rng);
         }
-        PhotonMap { photons: tracer.photons, ledger: tracer.ledger }
+        PhotonMap {
+            photons: tracer.photons,
+            ledger: tracer.ledger,
+        }
     }
 }

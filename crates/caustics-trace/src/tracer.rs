@@ -50,8 +50,11 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
-    const DIRECTION_CHANGE_LIMIT: f32 =
-        if N > 2 { NARROWING * DIRECTION_CHANGE_LIMIT } else { DIRECTION_CHANGE_LIMIT };
+    const DIRECTION_CHANGE_LIMIT: f32 = if N > 2 {
+        NARROWING * DIRECTION_CHANGE_LIMIT
+    } else {
+        DIRECTION_CHANGE_LIMIT
+    };
 
     pub(crate) fn new(world: &'a World, intersect: &'a I, options: &'a TraceOptions) -> Self {
         Self {
@@ -66,7 +69,12 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
     }
 
     /// Follows one emitted photon and all its branches to their ends.
-    pub(crate) fn trace(&mut self, emission: &Emission<N>, media: MediumStack, rng: &mut CounterRng) {
+    pub(crate) fn trace(
+        &mut self,
+        emission: &Emission<N>,
+        media: MediumStack,
+        rng: &mut CounterRng,
+    ) {
         self.ledger.emit(emission.flux);
         let threshold = self.options.min_weight * emission.flux.max_element();
         self.pending.push(Branch {
@@ -93,7 +101,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         }
         self.ledger.rays += 1;
         let Some(hit) = self.intersect.closest_hit(&branch.ray) else {
-            let fate = if branch.events == 0 { Fate::Missed } else { Fate::Escaped };
+            let fate = if branch.events == 0 {
+                Fate::Missed
+            } else {
+                Fate::Escaped
+            };
             self.ledger.book(fate, branch.flux);
             return;
         };
@@ -102,11 +114,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             return;
         };
         self.absorb(&mut branch, hit.t);
-        branch.differential = branch.differential.transferred(
-            branch.ray.direction,
-            hit.t,
-            point.geometric_normal,
-        );
+        branch.differential =
+            branch
+                .differential
+                .transferred(branch.ray.direction, hit.t, point.geometric_normal);
         branch.depth += 1;
 
         let split = branch.channel.is_none() && self.disperses(&point);
@@ -120,7 +131,13 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
                     continue;
                 }
             }
-            match scatter(self.world, &point, part.ray.direction, &part.media, part.channel) {
+            match scatter(
+                self.world,
+                &point,
+                part.ray.direction,
+                &part.media,
+                part.channel,
+            ) {
                 None => self.receive(&part, &point),
                 Some(_) if part.depth >= self.options.max_depth => {
                     self.ledger.book(Fate::TooDeep, part.flux);
@@ -175,13 +192,18 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
     ) {
         self.ledger.normal_fallbacks += u64::from(scattering.fallbacks);
         if scattering.absorbed != Vec3::ZERO {
-            self.ledger.book(Fate::Absorbed, branch.flux * scattering.absorbed);
+            self.ledger
+                .book(Fate::Absorbed, branch.flux * scattering.absorbed);
         }
         let both = scattering.outgoing().count() == 2;
         let splits = match self.options.branching {
             Branching::Roulette => false,
             Branching::SplitFirst => !branch.has_split,
             Branching::SplitAll => true,
+        };
+        let branch = &Branch {
+            has_split: branch.has_split || (both && splits),
+            ..*branch
         };
         if both && !splits {
             // The Fresnel term is the same for all channels, so the choice leaves the flux as it is.
@@ -205,7 +227,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
 
     /// Queues one outgoing direction, if roulette lets it live. `kept` is the part of such paths
     /// that were chosen to go on here.
-    #[expect(clippy::too_many_arguments, reason = "the state of one event, used in one place")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the state of one event, used in one place"
+    )]
     fn follow(
         &mut self,
         branch: &Branch<N>,
@@ -232,10 +257,14 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             kept *= survival;
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
-        let differential = self.scattered(branch, point, outgoing).scaled(kept.powf(-1.0 / N as f32));
+        let differential = self
+            .scattered(branch, point, outgoing)
+            .scaled(kept.powf(-1.0 / N as f32));
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
-        let origin = point.spawn.origin_towards(point.geometric_normal, outgoing.direction);
+        let origin = point
+            .spawn
+            .origin_towards(point.geometric_normal, outgoing.direction);
         self.pending.push(Branch {
             ray: Ray::new(origin, outgoing.direction),
             differential,
@@ -243,7 +272,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             media: outgoing.media,
             depth: branch.depth,
             events: branch.events + u32::from(outgoing.event != Event::Passage),
-            has_split: branch.has_split || outgoing.weight.max_element() < 1.0,
+            has_split: branch.has_split,
             channel: branch.channel,
             path: extended(branch.path, point.object, 1 + outgoing.event as u32),
         });
@@ -281,6 +310,9 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
 /// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
 /// whole words).
 fn extended(path: u32, object: u32, event: u32) -> u32 {
-    let word = object.wrapping_mul(4).wrapping_add(event).wrapping_add(0x9E37_79B9);
+    let word = object
+        .wrapping_mul(4)
+        .wrapping_add(event)
+        .wrapping_add(0x9E37_79B9);
     (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
 }

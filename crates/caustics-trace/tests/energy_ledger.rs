@@ -6,7 +6,7 @@ use caustics_geometry::shapes::quad;
 use caustics_sampling::Sequence;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{DVec3, Vec3};
-use caustics_trace::{Aim, Branching, Refinement, Fate, TraceOptions, trace_photons};
+use caustics_trace::{Aim, Branching, Fate, Refinement, TraceOptions, trace_photons};
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
 

@@ -1,33 +1,53 @@
 //! Lattices that are made finer where caustics have edges: the energy, the budget, the place.
 
 use caustics_scene::{BvhOptions, Instance, Light, Material, Scene, Shape, World};
-use caustics_trace::{EnergyLedger, Fate, Photon, PhotonMap, Refinement, TraceOptions, trace_photons};
+use caustics_trace::{
+    EnergyLedger, Fate, Photon, PhotonMap, Refinement, TraceOptions, trace_photons,
+};
 use glam::Vec3;
 
 /// A glass sphere over a floor, and a lamp.
 fn world() -> World {
     let mut scene = Scene::new();
-    let glass = scene.add_material(Material::dielectric("glass", 1.5)).unwrap();
-    let white = scene.add_material(Material::diffuse("white", [0.8; 3])).unwrap();
-    let ball = Shape::Sphere { center: Vec3::new(0.0, 1.5, 0.0), radius: 1.0 };
-    scene.add_instance(Instance::new("ball", ball, glass)).unwrap();
-    let floor = caustics_geometry::shapes::quad(
-        [-5.0, 0.0, 5.0],
-        [10.0, 0.0, 0.0],
-        [0.0, 0.0, -10.0],
-    );
-    let floor = Shape::Mesh(scene.add_mesh(floor.unwrap()));
-    scene.add_instance(Instance::new("floor", floor, white)).unwrap();
-    scene.add_light(Light::point([-1.0, 6.0, 0.5], [100.0; 3]).unwrap()).unwrap();
-    World::new(&scene).unwrap()
+    let glass = scene
+        .add_material(Material::dielectric("glass", 1.5))
+        .expect("valid");
+    let white = scene
+        .add_material(Material::diffuse("white", [0.8; 3]))
+        .expect("valid");
+    let ball = Shape::Sphere {
+        center: Vec3::new(0.0, 1.5, 0.0),
+        radius: 1.0,
+    };
+    scene
+        .add_instance(Instance::new("ball", ball, glass))
+        .expect("valid");
+    let floor =
+        caustics_geometry::shapes::quad([-5.0, 0.0, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0]);
+    let floor = Shape::Mesh(scene.add_mesh(floor.expect("valid")));
+    scene
+        .add_instance(Instance::new("floor", floor, white))
+        .expect("valid");
+    scene
+        .add_light(Light::point([-1.0, 6.0, 0.5], [100.0; 3]).expect("valid"))
+        .expect("valid");
+    World::new(&scene).expect("valid")
 }
 
 fn trace(levels: u32, photons: u32, seed: u64) -> PhotonMap {
     let world = world();
-    let intersector = world.intersector(&BvhOptions::default()).unwrap();
-    let refinement = Refinement { levels, ..Refinement::default() };
-    let options = TraceOptions { photons, seed, refinement, ..TraceOptions::default() };
-    trace_photons(&world, &intersector, &options, &|_| {}).unwrap()
+    let intersector = world.intersector(&BvhOptions::default()).expect("valid");
+    let refinement = Refinement {
+        levels,
+        ..Refinement::default()
+    };
+    let options = TraceOptions {
+        photons,
+        seed,
+        refinement,
+        ..TraceOptions::default()
+    };
+    trace_photons(&world, &intersector, &options, &|_| {}).expect("valid")
 }
 
 fn stored(ledger: &EnergyLedger) -> f64 {
@@ -39,9 +59,17 @@ fn energy_balances_and_is_that_of_an_even_lattice() {
     let even = trace(0, 40_000, 0);
     for (levels, seed) in [(1, 0), (3, 0), (5, 7)] {
         let refined = trace(levels, 40_000, seed);
-        assert!(refined.ledger.imbalance() < 1e-9, "{}", refined.ledger.imbalance());
+        assert!(
+            refined.ledger.imbalance() < 1e-9,
+            "{}",
+            refined.ledger.imbalance()
+        );
         let emitted = refined.ledger.emitted();
-        assert!(emitted.count <= 40_000 && emitted.count > 20_000, "{}", emitted.count);
+        assert!(
+            emitted.count <= 40_000 && emitted.count > 20_000,
+            "{}",
+            emitted.count
+        );
         let total = refined.ledger.emitted().flux.x / even.ledger.emitted().flux.x;
         assert!((total - 1.0).abs() < 1e-6, "{total}");
         let caustic = stored(&refined.ledger) / stored(&even.ledger);
@@ -57,9 +85,17 @@ fn photons_gather_at_the_edge_of_the_lens() {
     let refined = trace(4, 40_000, 0);
     let flux = |photon: &Photon| photon.flux.x / (photon.events as f32);
     let largest = refined.photons.iter().map(flux).fold(0.0, f32::max);
-    let small = refined.photons.iter().filter(|it| flux(it) < 0.1 * largest).count();
+    let small = refined
+        .photons
+        .iter()
+        .filter(|it| flux(it) < 0.1 * largest)
+        .count();
     let even = trace(0, 40_000, 0);
-    let even_small = even.photons.iter().filter(|it| flux(it) < 0.1 * largest).count();
+    let even_small = even
+        .photons
+        .iter()
+        .filter(|it| flux(it) < 0.1 * largest)
+        .count();
     assert!(small > 2 * even_small, "{small} {even_small}");
 }
 

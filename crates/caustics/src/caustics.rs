@@ -35,7 +35,10 @@ impl CausticsOptions {
     pub fn for_estimate(estimate: Estimate) -> Self {
         let mut options = Self {
             bvh: BvhOptions::default(),
-            trace: TraceOptions { sequence: estimate.sequence(), ..TraceOptions::default() },
+            trace: TraceOptions {
+                sequence: estimate.sequence(),
+                ..TraceOptions::default()
+            },
             estimate,
             nearest: NearestOptions::default(),
             footprint: FootprintOptions::default(),
@@ -120,16 +123,30 @@ impl Caustics {
         }
         let intersector = world.intersector(&options.bvh)?;
         let build = start.elapsed().as_secs_f64();
-        progress(Progress { stage: Stage::Build, finished: 1, total: 1 });
+        progress(Progress {
+            stage: Stage::Build,
+            finished: 1,
+            total: 1,
+        });
 
         let start = Instant::now();
         let total = u64::from(options.trace.photons);
         let map = trace_photons(&world, &intersector, &options.trace, &|finished| {
-            progress(Progress { stage: Stage::Trace, finished: u64::from(finished), total });
+            progress(Progress {
+                stage: Stage::Trace,
+                finished: u64::from(finished),
+                total,
+            });
         })?;
         let trace = start.elapsed().as_secs_f64();
         let seconds = StageSeconds { build, trace };
-        Ok(Self { world, intersector, map, options: options.clone(), seconds })
+        Ok(Self {
+            world,
+            intersector,
+            map,
+            options: options.clone(),
+            seconds,
+        })
     }
 
     /// The picture that `camera` takes: direct light and caustics apart, as linear radiance.
@@ -160,12 +177,26 @@ impl Caustics {
             nearest = NearestEstimate::new(photons, &self.options.nearest)?;
             CausticSource::Nearest(&nearest)
         } else {
-            CausticSource::Footprints { photons, options: &self.options.footprint }
+            CausticSource::Footprints {
+                photons,
+                options: &self.options.footprint,
+            }
         };
         let total = u64::from(options.height);
-        Ok(render(&self.world, &self.intersector, camera, source, options, &|rows| {
-            progress(Progress { stage: Stage::Render, finished: u64::from(rows), total });
-        })?)
+        Ok(render(
+            &self.world,
+            &self.intersector,
+            camera,
+            source,
+            options,
+            &|rows| {
+                progress(Progress {
+                    stage: Stage::Render,
+                    finished: u64::from(rows),
+                    total,
+                });
+            },
+        )?)
     }
 
     /// The scene in world space.
