@@ -1,6 +1,5 @@
 use std::f32::consts::{PI, SQRT_2};
 
-use caustics_geometry::Aabb;
 use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 
@@ -14,7 +13,7 @@ const GAUSSIAN_CUT: f32 = 9.0;
 const MIN_INCIDENCE: f32 = 0.05;
 
 /// The least cosine between the normals of a footprint and of a point that it may light.
-const MIN_NORMAL_COSINE: f32 = 0.5;
+pub(crate) const MIN_NORMAL_COSINE: f32 = 0.5;
 
 /// How far off its plane a footprint lights, relative to its radius.
 const PLANE_DISTANCE: f32 = 0.3;
@@ -316,24 +315,36 @@ impl Density {
         }
     }
 
-    /// A box that holds every point that it may light.
-    pub(crate) fn bounds(&self) -> Aabb {
-        let [a, b] = self.axes;
-        let deviation = Vec3::from_array(std::array::from_fn(|axis| a[axis].hypot(b[axis])));
-        let flat = self.kernel.outer_reach() * deviation;
-        let off = self.gate().reach;
+    /// The way from its plane towards the light, one metre off the plane: how points are followed
+    /// to it.
+    pub(crate) fn towards_light(&self) -> Vec3 {
         let incidence = self.incoming.dot(self.normal);
-        let along = if incidence < -MIN_INCIDENCE {
-            self.incoming / incidence
-        } else {
-            self.normal
-        };
-        let rounding = 4.0 * f32::EPSILON * self.center.abs();
-        let extent = flat + off * along.abs() + rounding;
-        Aabb {
-            min: self.center - extent,
-            max: self.center + extent,
-        }
+        if incidence < -MIN_INCIDENCE { self.incoming / incidence } else { self.normal }
+    }
+
+    /// Where its longest axis lies: the coordinates, in standard deviations, of a point one
+    /// standard deviation along it.
+    pub(crate) fn long_direction(&self) -> Vec2 {
+        let [a, b] = self.axes;
+        let double_angle = (2.0 * a.dot(b)).atan2(a.length_squared() - b.length_squared());
+        Vec2::from_angle(0.5 * double_angle)
+    }
+
+    /// The displacement for coordinates in standard deviations.
+    pub(crate) fn displacement(&self, coordinates: Vec2) -> Vec3 {
+        coordinates.x * self.axes[0] + coordinates.y * self.axes[1]
+    }
+
+    /// Dot products with these are a displacement's coordinates, in standard deviations.
+    pub(crate) fn gradients(&self) -> [Vec3; 2] {
+        [self.u_gradient, self.v_gradient]
+    }
+
+    /// Irradiance for a value of the kernel on a receiver with unit `normal`.
+    #[inline]
+    pub(crate) fn irradiance_at(&self, kernel: f32, normal: Vec3) -> Vec3 {
+        let cosine = (-normal.dot(self.incoming)).max(0.0);
+        self.strength * (kernel * cosine)
     }
 
     /// Coordinates of a point, in standard deviations.
@@ -348,8 +359,7 @@ impl Density {
     #[inline]
     pub(crate) fn irradiance(&self, point: Vec3, normal: Vec3) -> Vec3 {
         let (u, v) = self.coordinates(point);
-        let cosine = (-normal.dot(self.incoming)).max(0.0);
-        self.strength * (self.kernel.density(u, v) * cosine)
+        self.irradiance_at(self.kernel.density(u, v), normal)
     }
 
     /// What is the same for all points that are lit.
@@ -378,6 +388,11 @@ impl Density {
     /// Squared radius, in standard deviations, beyond which there is no light.
     pub(crate) fn cut(&self) -> f32 {
         self.kernel.cut()
+    }
+
+    /// See [`FootprintKernel::outer_reach`].
+    pub(crate) fn outer_reach(&self) -> f32 {
+        self.kernel.outer_reach()
     }
 
     /// Makes it `factor` times as bright.
@@ -417,10 +432,15 @@ impl Gate {
     /// Whether a point with a normal passes.
     pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
         let off = (point - density.center).dot(density.normal);
-        let is_before = off >= 0.0 && off <= self.reach;
-        let is_beyond =
-            off >= -self.plane_distance && normal.dot(density.normal) >= self.normal_cosine;
-        is_before || (is_beyond && off < 0.0)
+        self.admits_at(off, normal.dot(density.normal))
+    }
+
+    /// Whether a point passes that lies `off` metres before the plane, and whose normal has this
+    /// cosine with the footprint's.
+    #[inline]
+    pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32) -> bool {
+        let lowest = if normal_cosine >= self.normal_cosine { -self.plane_distance } else { 0.0 };
+        off >= lowest && off <= self.reach
     }
 }
 

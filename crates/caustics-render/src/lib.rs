@@ -91,6 +91,7 @@ mod estimate;
 mod eye;
 mod footprint;
 mod footprint_gather;
+mod footprint_piece;
 mod gbuffer;
 mod nearest;
 mod picture;

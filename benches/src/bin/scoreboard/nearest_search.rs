@@ -1,6 +1,6 @@
 //! The number of nearest photons and the kernel that suit a scene best.
 
-use caustics::accel::{LeftBalancedTree, NearestScratch};
+use caustics::accel::{NearestScratch, PhotonTree};
 use caustics::filter::{Image, Kernel, relative_mse};
 use caustics::glam::Vec3;
 use caustics::render::{NearestEstimate, NearestOptions};
@@ -111,7 +111,7 @@ fn radiances_of_all(
 ) -> Result<Vec<Vec<Vec3>>, Failure> {
     let reach = NearestEstimate::new(photons, &NearestOptions::default())?.max_radius();
     let positions: Vec<Vec3> = photons.iter().map(|photon| photon.position).collect();
-    let tree = LeftBalancedTree::new(&positions)?;
+    let tree = PhotonTree::new(&positions)?;
     let most = COUNTS.into_iter().max().unwrap_or(1);
     let of_one = |scratch: &mut NearestScratch, receiver: &Receiver| {
         let accept = |index: u32| {
@@ -124,6 +124,9 @@ fn radiances_of_all(
                     < MAX_PLANE_DISTANCE * reach
         };
         let found = tree.nearest_where(receiver.position, most, reach, accept, scratch);
+        // The tree puts only the farthest in its place.
+        let mut found = found.to_vec();
+        found.sort_unstable_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared));
         let irradiance = |options: &NearestOptions| {
             let taken = &found[..found.len().min(options.count)];
             let radius_squared = match taken.last() {
