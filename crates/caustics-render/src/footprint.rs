@@ -319,7 +319,11 @@ impl Density {
     /// to it.
     pub(crate) fn towards_light(&self) -> Vec3 {
         let incidence = self.incoming.dot(self.normal);
-        if incidence < -MIN_INCIDENCE { self.incoming / incidence } else { self.normal }
+        if incidence < -MIN_INCIDENCE {
+            self.incoming / incidence
+        } else {
+            self.normal
+        }
     }
 
     /// Where its longest axis lies: the coordinates, in standard deviations, of a point one
@@ -439,7 +443,11 @@ impl Gate {
     /// cosine with the footprint's.
     #[inline]
     pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32) -> bool {
-        let lowest = if normal_cosine >= self.normal_cosine { -self.plane_distance } else { 0.0 };
+        let lowest = if normal_cosine >= self.normal_cosine {
+            -self.plane_distance
+        } else {
+            0.0
+        };
         off >= lowest && off <= self.reach
     }
 }
