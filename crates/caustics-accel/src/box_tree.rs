@@ -247,7 +247,7 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Takes from the binary tree, for each node, the descendants that are left when the largest
     /// is replaced by its children until there are eight. Returns whether the result is flat
-    /// enough for the stack of a search; if not, it is thrown away.
+    /// enough for a search's stack; if not, it is thrown away.
     fn collapse(&mut self, binary: &Bvh2) -> bool {
         self.nodes.push(Node::EMPTY);
         // A node, the binary one that it stands for, and the level it is on.
@@ -334,5 +334,46 @@ impl Node {
             self.bounds[axis][1][lane] = bounds.max[axis];
         }
         self.children[lane] = child;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tree_too_deep_to_search_is_packed_instead() {
+        let boxes: Vec<Aabb> = (0..800)
+            .map(|index| Aabb::new(Vec3::ZERO, Vec3::splat(1.0 + index as f32)))
+            .collect();
+        let mut builder = Builder {
+            boxes: &boxes,
+            nodes: Vec::new(),
+            order: Vec::new(),
+        };
+        let binary = cluster(&boxes);
+        // Clustering such boxes from the bottom up makes a chain.
+        assert!(!builder.collapse(&binary));
+        assert!(builder.nodes.is_empty() && builder.order.is_empty());
+
+        builder.pack(&binary.primitive_indices);
+        // 800 in parts of 100, of 13, and of 2 or 1.
+        assert!(builder.nodes.len() <= 1 + 8 + 64 + 512);
+        let tree = BoxTree {
+            nodes: builder.nodes,
+            boxes: boxes.len(),
+            dispatch: Dispatch::new(Instructions::Detect),
+        };
+        for (first, bounds) in boxes.iter().enumerate() {
+            let mut found = Vec::new();
+            tree.for_each_around(bounds.max, |place| found.push(builder.order[place]));
+            found.sort_unstable();
+            assert!(found.into_iter().eq(first as u32..800));
+        }
+    }
+
+    #[test]
+    fn nodes_fill_whole_cache_lines() {
+        assert_eq!(size_of::<Node>(), 256);
     }
 }

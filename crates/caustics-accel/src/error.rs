@@ -56,6 +56,20 @@ pub enum AccelError {
         /// The most that fit.
         limit: usize,
     },
+    /// A tree was refitted to another number of triangles than it holds.
+    #[error("{given} triangles were given to a tree of {expected}")]
+    TriangleCountChanged {
+        /// Triangles given.
+        given: usize,
+        /// Triangles that the tree was built from.
+        expected: usize,
+    },
+    /// A triangle that could not be hit when the tree was built, being a line or a point, now can.
+    #[error("triangle {triangle} had no area when the tree was built: build a new one")]
+    TriangleAppeared {
+        /// Index of the first such triangle.
+        triangle: usize,
+    },
     /// A box has a NaN or infinite bound, or is empty.
     #[error("box {index} is empty or not finite")]
     InvalidBox {
