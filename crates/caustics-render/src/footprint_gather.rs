@@ -371,6 +371,7 @@ fn extent_bounds(photons: &[Photon], options: &FootprintOptions, diagonal: f32) 
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use proptest::prelude::*;
 
     fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
         Photon {
@@ -472,5 +473,76 @@ mod tests {
             gather.irradiance_over(Vec3::ZERO, Vec3::Y, [Vec3::MAX; 2]),
             Vec3::ZERO
         );
+    }
+
+    /// Footprints from a millimetre to ten metres, at any angle to each other and to the light.
+    fn any_photon() -> impl Strategy<Value = Photon> {
+        let unit = || {
+            prop::array::uniform3(-1.0f32..1.0)
+                .prop_map(Vec3::from)
+                .prop_filter("too short", |v| v.length_squared() > 0.01)
+                .prop_map(Vec3::normalize)
+        };
+        let exponent = || -3.0f32..1.0;
+        (
+            prop::array::uniform3(-1.0f32..1.0),
+            unit(),
+            unit(),
+            (0.0f32..3.2, 0.0f32..3.2),
+            (exponent(), exponent()),
+        )
+            .prop_map(|(position, normal, incoming, (one, other), (a, b))| {
+                let (tangent, bitangent) = normal.any_orthonormal_pair();
+                let axis = |angle: f32, exponent: f32| {
+                    10.0f32.powf(exponent) * (angle.cos() * tangent + angle.sin() * bitangent)
+                };
+                Photon {
+                    position: position.into(),
+                    incoming: if incoming.dot(normal) < 0.0 {
+                        incoming
+                    } else {
+                        -incoming
+                    },
+                    flux: Vec3::new(3.0, 2.0, 1.0),
+                    normal,
+                    axes: [axis(one, a), axis(other, b)],
+                    object: 0,
+                    events: 1,
+                }
+            })
+    }
+
+    proptest! {
+        /// The tree and the pieces find each footprint that lights a point, once.
+        #[test]
+        fn every_point_is_lit_by_the_sum_of_all_footprints(
+            photons in prop::collection::vec(any_photon(), 1..60),
+            kernel in prop::sample::select(&FootprintKernel::ALL[..]),
+        ) {
+            let options = FootprintOptions { kernel, ..FootprintOptions::default() };
+            let gather = FootprintGather::new(&photons, &options).unwrap();
+            prop_assert_eq!(gather.len(), photons.len());
+            let pixel = [0.05 * Vec3::X, Vec3::new(0.0, 0.02, 0.05)];
+            for photon in &photons {
+                let [a, b] = photon.axes;
+                for aside in [Vec3::ZERO, a, b - 0.3 * a, 0.7 * b + 0.01 * photon.normal] {
+                    let (position, normal) = (photon.position + aside, photon.normal);
+                    let (mut alone, mut blurred) = (Vec3::ZERO, Vec3::ZERO);
+                    for density in &gather.densities {
+                        if density.gate().admits(density, position, normal) {
+                            alone += density.irradiance(position, normal);
+                        }
+                        let density = density.blurred(&pixel).unwrap();
+                        if density.gate().admits(&density, position, normal) {
+                            blurred += density.irradiance(position, normal);
+                        }
+                    }
+                    let found = gather.irradiance(position, normal);
+                    prop_assert!(found.abs_diff_eq(alone, 1e-5 * alone.x), "{found} {alone}");
+                    let found = gather.irradiance_over(position, normal, pixel);
+                    prop_assert!(found.abs_diff_eq(blurred, 1e-5 * blurred.x), "{found} {blurred}");
+                }
+            }
+        }
     }
 }

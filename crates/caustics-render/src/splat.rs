@@ -359,7 +359,9 @@ impl Level {
         )
     }
 
-    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle.
+    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle,
+    /// moved to the middle of those on the same surface: what is found there is taken to be the
+    /// light in the block's middle.
     fn coarser(&self) -> Self {
         let stride = STRIDE as usize;
         let (width, height) = (self.width.div_ceil(stride), self.height.div_ceil(stride));
@@ -376,9 +378,15 @@ impl Level {
                     let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
                     Some((off, texel))
                 });
-                inside
-                    .min_by(|a, b| a.0.total_cmp(&b.0))
-                    .map(|(_, texel)| texel)
+                let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
+                let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
+                let (sum, count) = alike.fold((Vec3::ZERO, 0.0), |(sum, count), (_, texel)| {
+                    (sum + texel.position, count + 1.0)
+                });
+                Some(Texel {
+                    position: sum / count,
+                    ..nearest
+                })
             })
             .collect();
         Self::new(width, height, texels, Vec::new())
