@@ -70,4 +70,18 @@ pub enum AccelError {
         /// Index of the first such triangle.
         triangle: usize,
     },
+    /// A box has a NaN or infinite bound, or is empty.
+    #[error("box {index} is empty or not finite")]
+    InvalidBox {
+        /// Index of the first such box.
+        index: usize,
+    },
+    /// More boxes than an index can number.
+    #[error("{count} boxes are more than the limit of {limit}")]
+    TooManyBoxes {
+        /// Boxes given.
+        count: usize,
+        /// The most that fit.
+        limit: usize,
+    },
 }

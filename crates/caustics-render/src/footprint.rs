@@ -1,20 +1,16 @@
-use std::f32::consts::{PI, SQRT_2};
-
-use caustics_geometry::Aabb;
 use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 
+use crate::covariance::Covariance;
 use crate::error::RenderError;
-
-/// Squared radius, in standard deviations, at which the Gaussian is cut off.
-const GAUSSIAN_CUT: f32 = 9.0;
+use crate::footprint_kernel::FootprintKernel;
 
 /// The least cosine between a photon's direction and its receiver at which other points of the
 /// receiver are still followed along that direction; below it they are followed along the normal.
 const MIN_INCIDENCE: f32 = 0.05;
 
 /// The least cosine between the normals of a footprint and of a point that it may light.
-const MIN_NORMAL_COSINE: f32 = 0.5;
+pub(crate) const MIN_NORMAL_COSINE: f32 = 0.5;
 
 /// How far off its plane a footprint lights, relative to its radius.
 const PLANE_DISTANCE: f32 = 0.3;
@@ -22,128 +18,7 @@ const PLANE_DISTANCE: f32 = 0.3;
 /// How far along its light a point is followed to the footprint's plane, relative to the distance
 /// allowed off that plane: at grazing incidence, points that the light passes far above are not
 /// the footprint's.
-const MAX_SLIDE: f32 = 2.0;
-
-/// The shape in which a footprint spreads its flux.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum FootprintKernel {
-    /// A Gaussian with the footprint's axes for its standard deviations, cut off at three of them.
-    #[default]
-    Gaussian,
-    /// Epanechnikov's parabola over the footprint's ellipse, as in adaptive anisotropic photon
-    /// scattering (Yang and Ouyang 2021).
-    Ellipse,
-    /// Constant over a disc of the footprint's area (Larsen 2006).
-    Disc,
-    /// The product of two tents along the footprint's axes: on a lattice they sum to one.
-    Tent,
-}
-
-impl FootprintKernel {
-    /// All kernels.
-    pub const ALL: [Self; 4] = [Self::Gaussian, Self::Ellipse, Self::Disc, Self::Tent];
-
-    /// The name in lower case.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Gaussian => "gaussian",
-            Self::Ellipse => "ellipse",
-            Self::Disc => "disc",
-            Self::Tent => "tent",
-        }
-    }
-
-    /// Squared radius, in standard deviations, beyond which the kernel is zero.
-    pub(crate) fn cut(self) -> f32 {
-        match self {
-            Self::Gaussian => GAUSSIAN_CUT,
-            Self::Ellipse => 6.0,
-            Self::Disc => 4.0,
-            Self::Tent => 12.0,
-        }
-    }
-
-    /// The variance that a pixel adds along each of its edges, in squared pixels.
-    ///
-    /// For the Gaussian it is that of the box as wide as the pixel. The others end sooner, and need
-    /// more to reach a pixel's middle from wherever they stand.
-    pub(crate) fn pixel_variance(self) -> f32 {
-        if self == Self::Gaussian {
-            1.0 / 12.0
-        } else {
-            0.25
-        }
-    }
-
-    /// The extent of the kernel along each of its axes, for axes of one standard deviation.
-    pub(crate) fn reach(self) -> f32 {
-        match self {
-            Self::Gaussian => GAUSSIAN_CUT.sqrt(),
-            // Radii at which each kernel has the variance 1 along each axis.
-            Self::Ellipse | Self::Tent => 6.0f32.sqrt(),
-            Self::Disc => 2.0,
-        }
-    }
-
-    /// How far a blur of one standard deviation carries light from where it would be, in any
-    /// direction, along the receiver or off its plane.
-    pub(crate) fn search_reach(self) -> f32 {
-        self.outer_reach() + self.reach() * MAX_SLIDE
-    }
-
-    /// The farthest that light gets along any direction, in standard deviations along that
-    /// direction.
-    fn outer_reach(self) -> f32 {
-        // The tent's corners lie beyond the ellipse.
-        if self == Self::Tent {
-            SQRT_2 * self.reach()
-        } else {
-            self.reach()
-        }
-    }
-
-    /// The kernel at coordinates along its axes in standard deviations; its integral is 1.
-    #[inline]
-    pub(crate) fn density(self, u: f32, v: f32) -> f32 {
-        let squared = u * u + v * v;
-        match self {
-            Self::Gaussian => gaussian(squared),
-            Self::Ellipse => (1.0 - squared / 6.0).max(0.0) / (3.0 * PI),
-            Self::Disc => {
-                if squared < 4.0 {
-                    0.25 / PI
-                } else {
-                    0.0
-                }
-            }
-            Self::Tent => {
-                let width = 6.0f32.sqrt();
-                let tent = |x: f32| (1.0 - x.abs() / width).max(0.0);
-                tent(u) * tent(v) / 6.0
-            }
-        }
-    }
-}
-
-/// The normal density at a squared radius, cut off and divided by what is left of its integral.
-///
-/// The exponential is `exp(-squared / 32)` by its series, to the 16th power: right to 1e-5 of its
-/// value up to the cut, without a branch or a call, so that loops over it use vector instructions.
-#[inline]
-fn gaussian(squared: f32) -> f32 {
-    /// `1 / (2 pi (1 - exp(-GAUSSIAN_CUT / 2)))`
-    const PEAK: f32 = 0.160_942_8;
-    let y = squared * (1.0 / 32.0);
-    let series =
-        1.0 - y * (1.0 - y * (1.0 / 2.0 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0)))));
-    let second = series * series;
-    let fourth = second * second;
-    let eighth = fourth * fourth;
-    let value = PEAK * (eighth * eighth);
-    if squared < GAUSSIAN_CUT { value } else { 0.0 }
-}
+pub(crate) const MAX_SLIDE: f32 = 2.0;
 
 /// How photons are spread over their footprints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -316,24 +191,40 @@ impl Density {
         }
     }
 
-    /// A box that holds every point that it may light.
-    pub(crate) fn bounds(&self) -> Aabb {
-        let [a, b] = self.axes;
-        let deviation = Vec3::from_array(std::array::from_fn(|axis| a[axis].hypot(b[axis])));
-        let flat = self.kernel.outer_reach() * deviation;
-        let off = self.gate().reach;
+    /// The way from its plane towards the light, one metre off the plane: how points are followed
+    /// to it.
+    pub(crate) fn towards_light(&self) -> Vec3 {
         let incidence = self.incoming.dot(self.normal);
-        let along = if incidence < -MIN_INCIDENCE {
+        if incidence < -MIN_INCIDENCE {
             self.incoming / incidence
         } else {
             self.normal
-        };
-        let rounding = 4.0 * f32::EPSILON * self.center.abs();
-        let extent = flat + off * along.abs() + rounding;
-        Aabb {
-            min: self.center - extent,
-            max: self.center + extent,
         }
+    }
+
+    /// Where its longest axis lies: the coordinates, in standard deviations, of a point one
+    /// standard deviation along it.
+    pub(crate) fn long_direction(&self) -> Vec2 {
+        let [a, b] = self.axes;
+        let double_angle = (2.0 * a.dot(b)).atan2(a.length_squared() - b.length_squared());
+        Vec2::from_angle(0.5 * double_angle)
+    }
+
+    /// The displacement for coordinates in standard deviations.
+    pub(crate) fn displacement(&self, coordinates: Vec2) -> Vec3 {
+        coordinates.x * self.axes[0] + coordinates.y * self.axes[1]
+    }
+
+    /// Dot products with these are a displacement's coordinates, in standard deviations.
+    pub(crate) fn gradients(&self) -> [Vec3; 2] {
+        [self.u_gradient, self.v_gradient]
+    }
+
+    /// Irradiance for a value of the kernel on a receiver with unit `normal`.
+    #[inline]
+    pub(crate) fn irradiance_at(&self, kernel: f32, normal: Vec3) -> Vec3 {
+        let cosine = (-normal.dot(self.incoming)).max(0.0);
+        self.strength * (kernel * cosine)
     }
 
     /// Coordinates of a point, in standard deviations.
@@ -348,8 +239,7 @@ impl Density {
     #[inline]
     pub(crate) fn irradiance(&self, point: Vec3, normal: Vec3) -> Vec3 {
         let (u, v) = self.coordinates(point);
-        let cosine = (-normal.dot(self.incoming)).max(0.0);
-        self.strength * (self.kernel.density(u, v) * cosine)
+        self.irradiance_at(self.kernel.density(u, v), normal)
     }
 
     /// What is the same for all points that are lit.
@@ -378,6 +268,11 @@ impl Density {
     /// Squared radius, in standard deviations, beyond which there is no light.
     pub(crate) fn cut(&self) -> f32 {
         self.kernel.cut()
+    }
+
+    /// See [`FootprintKernel::outer_reach`].
+    pub(crate) fn outer_reach(&self) -> f32 {
+        self.kernel.outer_reach()
     }
 
     /// Makes it `factor` times as bright.
@@ -417,10 +312,19 @@ impl Gate {
     /// Whether a point with a normal passes.
     pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
         let off = (point - density.center).dot(density.normal);
-        let is_before = off >= 0.0 && off <= self.reach;
-        let is_beyond =
-            off >= -self.plane_distance && normal.dot(density.normal) >= self.normal_cosine;
-        is_before || (is_beyond && off < 0.0)
+        self.admits_at(off, normal.dot(density.normal))
+    }
+
+    /// Whether a point passes that lies `off` metres before the plane, and whose normal has this
+    /// cosine with the footprint's.
+    #[inline]
+    pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32) -> bool {
+        let lowest = if normal_cosine >= self.normal_cosine {
+            -self.plane_distance
+        } else {
+            0.0
+        };
+        off >= lowest && off <= self.reach
     }
 }
 
@@ -463,104 +367,4 @@ pub(crate) struct ExtentBounds {
 pub(crate) struct Adjustment {
     pub(crate) widened: bool,
     pub(crate) shortened: bool,
-}
-
-/// A symmetric matrix of two dimensions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Covariance {
-    xx: f32,
-    xy: f32,
-    yy: f32,
-}
-
-impl Covariance {
-    /// The covariance of the kernel over a footprint with `axes`.
-    fn of_axes(axes: &[Vec3; 2], normal: Vec3, options: &FootprintOptions) -> Self {
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let mut covariance = Self::default();
-        let squared = options.scale * options.scale;
-        for axis in axes {
-            covariance.add(squared, axis.dot(tangent), axis.dot(bitangent));
-        }
-        covariance.limit_anisotropy(options.max_anisotropy);
-        if options.kernel == FootprintKernel::Disc {
-            covariance = covariance.rounded();
-        }
-        covariance
-    }
-
-    fn add_pixel(&mut self, pixel: &[Vec3; 2], normal: Vec3, kernel: FootprintKernel) {
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        for axis in pixel {
-            self.add(
-                kernel.pixel_variance(),
-                axis.dot(tangent),
-                axis.dot(bitangent),
-            );
-        }
-    }
-
-    /// Adds to all directions what the shortest lacks to a variance of `least`; whether any.
-    fn widen(&mut self, least: f32) -> bool {
-        let (short, _) = self.eigenvalues();
-        let is_short = short < least;
-        if is_short {
-            self.xx += least - short;
-            self.yy += least - short;
-        }
-        is_short
-    }
-
-    fn add(&mut self, weight: f32, x: f32, y: f32) {
-        self.xx += weight * x * x;
-        self.xy += weight * x * y;
-        self.yy += weight * y * y;
-    }
-
-    fn eigenvalues(&self) -> (f32, f32) {
-        let mean = 0.5 * (self.xx + self.yy);
-        let half = 0.5 * (self.xx - self.yy);
-        let spread = (half * half + self.xy * self.xy).sqrt();
-        ((mean - spread).max(0.0), mean + spread)
-    }
-
-    /// Widens the short axis, all around, until the long one is at most `limit` times as long.
-    fn limit_anisotropy(&mut self, limit: f32) {
-        if !limit.is_finite() {
-            return;
-        }
-        let (short, long) = self.eigenvalues();
-        let least = long / (limit * limit);
-        if short < least && limit > 1.0 {
-            // Adding w to both eigenvalues: (long + w) / (short + w) = limit².
-            let widened = (long - limit * limit * short) / (limit * limit - 1.0);
-            self.xx += widened;
-            self.yy += widened;
-        } else if limit <= 1.0 {
-            *self = Self {
-                xx: long,
-                xy: 0.0,
-                yy: long,
-            };
-        }
-    }
-
-    /// A disc of the same area.
-    fn rounded(&self) -> Self {
-        let (short, long) = self.eigenvalues();
-        let variance = (short * long).sqrt();
-        Self {
-            xx: variance,
-            xy: 0.0,
-            yy: variance,
-        }
-    }
-
-    /// The lower triangular matrix whose product with its transpose this is: `[[xx, 0], [xy, yy]]`.
-    fn cholesky(&self) -> Option<[[f32; 2]; 2]> {
-        let xx = self.xx.sqrt();
-        let xy = self.xy / xx;
-        let yy = (self.yy - xy * xy).max(1e-6 * self.yy).sqrt();
-        (xx > 0.0 && yy > 0.0 && xx.is_finite() && yy.is_finite()).then_some([[xx, 0.0], [xy, yy]])
-    }
 }

@@ -11,16 +11,14 @@ use caustics_trace::{PhotonMap, TraceOptions, trace_photons};
 use crate::error::CausticsError;
 
 /// Everything that can be chosen about photons and how they become radiance.
-///
-/// [`for_estimate`](Self::for_estimate) sets what belongs together; the default is that of the
-/// best estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CausticsOptions {
     /// How the acceleration structure is built.
     pub bvh: BvhOptions,
     /// How photons are traced.
     pub trace: TraceOptions,
-    /// How they become radiance.
+    /// How they become radiance. It decides the points that photons are emitted from and the shape
+    /// of their footprints, whatever `trace.sequence` and `footprint.kernel` say.
     pub estimate: Estimate,
     /// The options of [`Estimate::Nearest`].
     pub nearest: NearestOptions,
@@ -29,24 +27,26 @@ pub struct CausticsOptions {
 }
 
 impl CausticsOptions {
-    /// The options that make `estimate` what its description says: where photons start, where they
-    /// split, and how they are spread.
+    /// The defaults, with another estimate.
     #[must_use]
     pub fn for_estimate(estimate: Estimate) -> Self {
-        let mut options = Self {
+        Self {
             bvh: BvhOptions::default(),
-            trace: TraceOptions {
-                sequence: estimate.sequence(),
-                ..TraceOptions::default()
-            },
+            trace: TraceOptions::default(),
             estimate,
             nearest: NearestOptions::default(),
             footprint: FootprintOptions::default(),
-        };
-        if let Some(kernel) = estimate.kernel() {
-            options.footprint.kernel = kernel;
         }
-        options
+        .settled()
+    }
+
+    /// With what the estimate decides.
+    fn settled(mut self) -> Self {
+        self.trace.sequence = self.estimate.sequence();
+        if let Some(kernel) = self.estimate.kernel() {
+            self.footprint.kernel = kernel;
+        }
+        self
     }
 }
 
@@ -116,6 +116,7 @@ impl Caustics {
         options: &CausticsOptions,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Self, CausticsError> {
+        let options = options.clone().settled();
         let start = Instant::now();
         let world = World::new(scene)?;
         if !world.is_lit() {
@@ -144,7 +145,7 @@ impl Caustics {
             world,
             intersector,
             map,
-            options: options.clone(),
+            options,
             seconds,
         })
     }
