@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use caustics::CausticsOptions;
 use caustics::accel::NearestScratch;
-use caustics::filter::{Image, relative_mse};
+use caustics::filter::{Comparison, Image};
 use caustics::render::{Estimate, FootprintGather, GBuffer, NearestEstimate, splat};
 use caustics::trace::trace_photons;
 use caustics_benches::receivers::{gather, receivers};
@@ -17,8 +17,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 const PHOTONS: u32 = 65_536;
 
-/// Of what error a picture is taken for the reference's at all: a black one has nearly 1 here.
-const MOST_ERROR: f64 = 0.5;
+/// The trimmed relMSE below which a picture is taken for the reference's at all: a black one is
+/// above it.
+const MOST_ERROR: f64 = 0.2;
 
 fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     let stage = Stage::load(name)?;
@@ -59,15 +60,18 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     let splatted = || splat(&buffer, photons, &options.footprint).map(|(image, _)| image);
 
     let check = |what: &str, image: &Image| {
-        let error = relative_mse(image, &stage.reference)?;
+        let error = Comparison::new(image, &stage.reference)?.relative_mse_trimmed;
         if error < MOST_ERROR {
             Ok(())
         } else {
             Err(Failure::from(format!(
-                "{name}: {what} is off by a relMSE of {error}"
+                "{name}: {what}: a trimmed relMSE of {error}"
             )))
         }
     };
+    if check("a black picture", &Image::new(width, height)?).is_ok() {
+        return Err(format!("{name}: a black picture passes for the reference").into());
+    }
     check("the splat", &splatted()?)?;
     check("the footprint gather", &gathered()?)?;
     check("the nearest photons", &looked_up()?)?;

@@ -48,7 +48,7 @@ pub struct Row {
 pub struct Conditions {
     /// Threads that did the work.
     pub threads: usize,
-    /// The machine's class.
+    /// The machine's class, without commas.
     pub machine: String,
     /// The day, in UTC.
     pub date: String,
@@ -87,7 +87,7 @@ impl Row {
             .map_or_else(String::new, |flip| format!("{flip:.5}"));
         format!(
             "{},{},{},{},{},{:.5},{},{:.5},{},{:.5},{:.5},{:.5},{:.6e},{:.6e},{:.6e},{flip},\
-             {threads},{},{date},{commit}",
+             {threads},{machine},{date},{commit}",
             self.scene,
             self.estimate,
             self.setting,
@@ -103,7 +103,6 @@ impl Row {
             self.relative_mse,
             self.relative_mse_trimmed,
             self.p999_relative,
-            machine.replace(',', ";"),
         )
     }
 

@@ -18,7 +18,7 @@ fn found(tree: &BoxTree, order: &[u32], query: &Aabb) -> Vec<u32> {
 }
 
 fn check(boxes: &[Aabb], queries: &[Aabb]) {
-    let (tree, order) = BoxTree::new(boxes).expect("valid boxes");
+    let (tree, order) = BoxTree::new(boxes).expect("finite boxes");
     let mut all = order.clone();
     all.sort_unstable();
     assert!(all.into_iter().eq(0..boxes.len() as u32));

@@ -1,6 +1,7 @@
 use glam::Vec3;
 
-use crate::footprint::{Density, FootprintKernel, Gate};
+use crate::footprint::{Density, Gate};
+use crate::footprint_kernel::FootprintKernel;
 use crate::gbuffer::Texel;
 
 /// Points in space or directions, each coordinate in a list of its own, so that loops over many

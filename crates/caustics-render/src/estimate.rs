@@ -1,6 +1,6 @@
 use caustics_sampling::Sequence;
 
-use crate::footprint::FootprintKernel;
+use crate::footprint_kernel::FootprintKernel;
 
 /// The ways to turn photons into radiance.
 ///

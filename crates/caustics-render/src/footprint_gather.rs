@@ -7,7 +7,8 @@ use glam::Vec3;
 
 use crate::error::RenderError;
 use crate::eye::Receiver;
-use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintKernel, FootprintOptions};
+use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
+use crate::footprint_kernel::FootprintKernel;
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
 
 /// Footprints' spacings below this part of all are the close ones.

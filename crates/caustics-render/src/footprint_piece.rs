@@ -1,7 +1,8 @@
 use caustics_geometry::Aabb;
 use glam::{Vec2, Vec3};
 
-use crate::footprint::{Density, FootprintKernel, Gate, MIN_NORMAL_COSINE};
+use crate::footprint::{Density, Gate, MIN_NORMAL_COSINE};
+use crate::footprint_kernel::FootprintKernel;
 
 /// The most pieces that a layer is cut into.
 const MAX_PIECES: u32 = 256;

@@ -85,12 +85,14 @@
 //! `parallel` (default): rows and photons on all processors.
 
 mod columns;
+mod covariance;
 mod direct;
 mod error;
 mod estimate;
 mod eye;
 mod footprint;
 mod footprint_gather;
+mod footprint_kernel;
 mod footprint_piece;
 mod gbuffer;
 mod nearest;
@@ -98,14 +100,16 @@ mod picture;
 mod pixel;
 mod screen;
 mod splat;
+mod splat_level;
 mod thinning;
 
 pub use direct::DirectLight;
 pub use error::RenderError;
 pub use estimate::Estimate;
 pub use eye::{EyeTracer, Receiver};
-pub use footprint::{FootprintKernel, FootprintOptions};
+pub use footprint::FootprintOptions;
 pub use footprint_gather::{FootprintGather, GatherStats};
+pub use footprint_kernel::FootprintKernel;
 pub use gbuffer::{GBuffer, Texel};
 pub use glam;
 pub use nearest::{NearestEstimate, NearestOptions};

@@ -1,23 +1,19 @@
 use caustics_filter::Image;
 use caustics_trace::Photon;
-use glam::{DVec3, Vec2, Vec3};
-use std::f32::consts::FRAC_1_PI;
+use glam::{Vec2, Vec3};
 use std::ops::Range;
 
-use crate::columns::{Columns, ColumnsMut, TexelColumns};
 use crate::error::RenderError;
 use crate::footprint::{Density, FootprintOptions, Gate};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::screen::Screen;
-
-/// Rows of one task.
-const BAND: usize = 16;
+use crate::splat_level::Level;
 
 /// Photons that are prepared at a time, to bound the memory.
 const BATCH: usize = 1 << 17;
 
 /// Pixels a side of a level's pixel on the level below.
-const STRIDE: u32 = 2;
+pub(crate) const STRIDE: u32 = 2;
 
 /// Levels of resolution.
 const LEVELS: usize = 7;
@@ -40,8 +36,6 @@ pub struct SplatStats {
     pub turned_away: u64,
     /// Photons whose footprint is not a finite number.
     pub invalid: u64,
-    /// Flux that reached texels, in watts.
-    pub deposited: DVec3,
 }
 
 /// Radiance of the caustics at every pixel of a G-buffer, in W/(sr m²): each photon spread over
@@ -75,7 +69,7 @@ pub fn splat(
             }
         }
         for (number, level) in levels.iter_mut().enumerate() {
-            stats.deposited += level.accumulate(&prepared, number);
+            level.accumulate(&prepared, number);
         }
     }
     while let Some(coarse) = levels.pop() {
@@ -89,10 +83,10 @@ pub fn splat(
 
 /// A photon made ready for one level of the picture.
 #[derive(Clone, Copy, Debug)]
-struct Splat {
-    density: Density,
-    gate: Gate,
-    level: u8,
+pub(crate) struct Splat {
+    pub(crate) density: Density,
+    pub(crate) gate: Gate,
+    pub(crate) level: u8,
     /// Whether a pixel's coordinates tell where it lies in the footprint; if not, every pixel of
     /// the rows and columns is asked.
     is_local: bool,
@@ -101,11 +95,11 @@ struct Splat {
     /// What a step of one pixel of the level along x and y adds to the footprint's coordinates.
     step_x: Vec2,
     step_y: Vec2,
-    columns: [u16; 2],
-    rows: [u16; 2],
+    pub(crate) columns: [u16; 2],
+    pub(crate) rows: [u16; 2],
 }
 
-enum Prepared {
+pub(crate) enum Prepared {
     Splat(Splat),
     Outside,
     TurnedAway,
@@ -195,7 +189,7 @@ impl Splat {
     }
 
     /// The pixels of a row whose middles lie in the footprint.
-    fn span(&self, row: usize) -> Range<usize> {
+    pub(crate) fn span(&self, row: usize) -> Range<usize> {
         let [first, last] = self.columns.map(usize::from);
         if !self.is_local {
             return first..last;
@@ -220,7 +214,7 @@ impl Splat {
 
     /// What the photon adds to the irradiance of a texel.
     #[inline]
-    fn irradiance(&self, texel: &Texel) -> Vec3 {
+    pub(crate) fn irradiance(&self, texel: &Texel) -> Vec3 {
         if self
             .gate
             .admits(&self.density, texel.position, texel.normal)
@@ -309,264 +303,5 @@ impl Bounds {
         let size = Vec2::new(screen.width as f32, screen.height as f32);
         let overlaps = self.high.cmpge(Vec2::ZERO).all() && self.low.cmple(size).all();
         overlaps.then_some(self)
-    }
-}
-
-/// The irradiance of a picture's texels at one resolution.
-struct Level {
-    width: usize,
-    height: usize,
-    texels: Vec<Option<Texel>>,
-    columns: TexelColumns,
-    irradiance: Columns,
-    extras: Vec<(u32, Texel)>,
-    extra_irradiance: Vec<Vec3>,
-    /// For each band, where its extras start; one more than there are bands.
-    extra_starts: Vec<usize>,
-}
-
-impl Level {
-    fn new(
-        width: usize,
-        height: usize,
-        texels: Vec<Option<Texel>>,
-        extras: Vec<(u32, Texel)>,
-    ) -> Self {
-        let bands = height.div_ceil(BAND);
-        let extra_starts = (0..=bands)
-            .map(|band| {
-                extras.partition_point(|&(pixel, _)| (pixel as usize) < band * BAND * width)
-            })
-            .collect();
-        Self {
-            width,
-            height,
-            irradiance: Columns::zero(texels.len()),
-            columns: TexelColumns::new(&texels),
-            texels,
-            extra_irradiance: vec![Vec3::ZERO; extras.len()],
-            extras,
-            extra_starts,
-        }
-    }
-
-    fn finest(buffer: &GBuffer) -> Self {
-        Self::new(
-            buffer.width() as usize,
-            buffer.height() as usize,
-            buffer.texels.clone(),
-            buffer.extras.clone(),
-        )
-    }
-
-    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle,
-    /// moved to the middle of those on the same surface: what is found there is taken to be the
-    /// light in the block's middle.
-    fn coarser(&self) -> Self {
-        let stride = STRIDE as usize;
-        let (width, height) = (self.width.div_ceil(stride), self.height.div_ceil(stride));
-        let texels = (0..width * height)
-            .map(|index| {
-                let (x0, y0) = (index % width * stride, index / width * stride);
-                let middle = (stride as f32 - 1.0) * 0.5;
-                let inside = (0..stride * stride).filter_map(|it| {
-                    let (dx, dy) = (it % stride, it / stride);
-                    let (x, y) = (x0 + dx, y0 + dy);
-                    let texel = (x < self.width && y < self.height)
-                        .then(|| self.texels[y * self.width + x])
-                        .flatten()?;
-                    let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
-                    Some((off, texel))
-                });
-                let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
-                let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
-                let (sum, count) = alike.fold((Vec3::ZERO, 0.0), |(sum, count), (_, texel)| {
-                    (sum + texel.position, count + 1.0)
-                });
-                Some(Texel {
-                    position: sum / count,
-                    ..nearest
-                })
-            })
-            .collect();
-        Self::new(width, height, texels, Vec::new())
-    }
-
-    /// Adds the splats of this level and returns the flux that they deposited.
-    fn accumulate(&mut self, prepared: &[Prepared], level: usize) -> DVec3 {
-        let bands = self.height.div_ceil(BAND);
-        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
-        for (index, item) in prepared.iter().enumerate() {
-            if let Prepared::Splat(splat) = item
-                && usize::from(splat.level) == level
-                && splat.rows[0] < splat.rows[1]
-            {
-                let first = usize::from(splat.rows[0]) / BAND;
-                let last = usize::from(splat.rows[1] - 1) / BAND;
-                for list in &mut lists[first..=last] {
-                    list.push(index as u32);
-                }
-            }
-        }
-        let mut extra_rest = self.extra_irradiance.as_mut_slice();
-        let mut tasks = Vec::with_capacity(bands);
-        for (number, irradiance) in self.irradiance.chunks_mut(BAND * self.width).enumerate() {
-            let extras = self.extra_starts[number]..self.extra_starts[number + 1];
-            let (extra_irradiance, rest) = extra_rest.split_at_mut(extras.len());
-            extra_rest = rest;
-            tasks.push(BandTask {
-                first_row: number * BAND,
-                width: self.width,
-                columns: &self.columns,
-                irradiance,
-                extras: &self.extras[extras],
-                extra_irradiance,
-                splats: &lists[number],
-            });
-        }
-        #[cfg(feature = "parallel")]
-        let deposited: Vec<DVec3> = {
-            use rayon::prelude::*;
-            tasks
-                .into_par_iter()
-                .with_max_len(1)
-                .map(|task| task.run(prepared))
-                .collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let deposited: Vec<DVec3> = tasks.into_iter().map(|task| task.run(prepared)).collect();
-        deposited.into_iter().sum()
-    }
-
-    fn add_coarser(&mut self, coarse: &Self) {
-        let stride = STRIDE as f32;
-        let width = self.width;
-        let place = |pixel: usize| {
-            let (x, y) = (pixel % width, pixel / width);
-            (Vec2::new(x as f32, y as f32) + 0.5) / stride - 0.5
-        };
-        if coarse.is_dark() {
-            return;
-        }
-        for (pixel, texel) in self.texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                let sum = self.irradiance.get(pixel) + coarse.interpolate(place(pixel), texel);
-                self.irradiance.set(pixel, sum);
-            }
-        }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&mut self.extra_irradiance) {
-            *irradiance += coarse.interpolate(place(*pixel as usize), texel);
-        }
-    }
-
-    fn is_dark(&self) -> bool {
-        self.irradiance
-            .x
-            .iter()
-            .chain(&self.irradiance.y)
-            .chain(&self.irradiance.z)
-            .all(|&it| it == 0.0)
-    }
-
-    /// The irradiance between the middles of pixels, from those that see the same surface.
-    fn interpolate(&self, at: Vec2, texel: &Texel) -> Vec3 {
-        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        // The four around the point; where none sees the surface, the next ones out.
-        for (first, last) in [(0, 1), (-1, 2)] {
-            let base = at.floor();
-            for dy in first..=last {
-                for dx in first..=last {
-                    let corner = base + Vec2::new(dx as f32, dy as f32);
-                    let (x, y) = (corner.x as isize, corner.y as isize);
-                    if x < 0 || y < 0 || x >= self.width as isize || y >= self.height as isize {
-                        continue;
-                    }
-                    let index = y as usize * self.width + x as usize;
-                    let Some(other) = &self.texels[index] else {
-                        continue;
-                    };
-                    if !texel.is_like(other) {
-                        continue;
-                    }
-                    let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
-                    let weight = tent.x * tent.y;
-                    sum += weight * self.irradiance.get(index);
-                    weights += weight;
-                }
-            }
-            if weights > 0.0 {
-                return sum / weights;
-            }
-        }
-        Vec3::ZERO
-    }
-
-    fn radiance(&self) -> Result<Image, RenderError> {
-        let mut image = Image::new(self.width as u32, self.height as u32)?;
-        let pixels = image.pixels_mut();
-        for (index, texel) in self.texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance.get(index)).to_array();
-            }
-        }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&self.extra_irradiance) {
-            let pixel = &mut pixels[*pixel as usize];
-            *pixel = (Vec3::from(*pixel) + FRAC_1_PI * texel.albedo * *irradiance).to_array();
-        }
-        Ok(image)
-    }
-}
-
-/// A band of rows and the splats that overlap it.
-struct BandTask<'a> {
-    first_row: usize,
-    width: usize,
-    columns: &'a TexelColumns,
-    /// From the band's first row on.
-    irradiance: ColumnsMut<'a>,
-    extras: &'a [(u32, Texel)],
-    extra_irradiance: &'a mut [Vec3],
-    splats: &'a [u32],
-}
-
-impl BandTask<'_> {
-    fn run(mut self, prepared: &[Prepared]) -> DVec3 {
-        let rows = self.irradiance.x.len() / self.width;
-        let deposited = DVec3::ZERO;
-        for &index in self.splats {
-            let Prepared::Splat(splat) = &prepared[index as usize] else {
-                continue;
-            };
-            let first = usize::from(splat.rows[0]).max(self.first_row);
-            let last = usize::from(splat.rows[1]).min(self.first_row + rows);
-            for row in first..last {
-                let span = splat.span(row);
-                let start = (row - self.first_row) * self.width;
-                self.columns.light(
-                    &splat.density,
-                    &splat.gate,
-                    row * self.width + span.start,
-                    span.len(),
-                    &mut self.irradiance,
-                    start + span.start,
-                );
-            }
-            if !self.extras.is_empty() && first < last {
-                let low = (first * self.width) as u32;
-                let high = (last * self.width) as u32;
-                let begin = self.extras.partition_point(|&(pixel, _)| pixel < low);
-                let columns = splat.columns.map(u32::from);
-                for (offset, (pixel, texel)) in self.extras[begin..].iter().enumerate() {
-                    if *pixel >= high {
-                        break;
-                    }
-                    let column = pixel % self.width as u32;
-                    if (columns[0]..columns[1]).contains(&column) {
-                        self.extra_irradiance[begin + offset] += splat.irradiance(texel);
-                    }
-                }
-            }
-        }
-        deposited
     }
 }

@@ -286,13 +286,12 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
     ) -> RayDifferential<N> {
         let before = &branch.differential;
         let direction = branch.ray.direction;
-        let normal_change = if outgoing.interpolated {
-            let side = if point.from_outside { 1.0 } else { -1.0 };
-            let gradient = self.world.normal_gradient(point);
-            before.position.map(|moved| side * gradient.along(moved))
-        } else {
-            [Vec3::ZERO; N]
-        };
+        let side = if point.from_outside { 1.0 } else { -1.0 };
+        let gradient = self.world.normal_gradient(point);
+        // Also where the geometric normal stood in, just inside a silhouette: most neighbours have
+        // the interpolated one, and turn as it does. A flat facet's footprint would stay as narrow
+        // as the beam that met it, and burn a spot.
+        let normal_change = before.position.map(|moved| side * gradient.along(moved));
         match outgoing.event {
             Event::Passage => *before,
             Event::Reflection => before.reflected(direction, outgoing.normal, normal_change),

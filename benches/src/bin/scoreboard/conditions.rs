@@ -11,7 +11,8 @@ pub(crate) fn conditions(machine: &str) -> Conditions {
         .map_or(0, |elapsed| elapsed.as_secs() / 86_400);
     Conditions {
         threads: rayon::current_num_threads(),
-        machine: machine.to_owned(),
+        // The rows' columns are parted by commas.
+        machine: machine.replace(',', ";"),
         date: date(days),
         commit: commit().unwrap_or_else(|| "unknown".to_owned()),
     }
