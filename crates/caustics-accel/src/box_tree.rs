@@ -17,7 +17,8 @@ const MAX_DEPTH: usize = (STACK - 1) / (WIDTH - 1);
 /// A bounding volume hierarchy over boxes, which finds those that hold a point or overlap a box.
 ///
 /// Each node has up to eight children that are tried at once, with AVX2 where the processor has
-/// it. 50 to 60 bytes a box.
+/// it. 40 to 60 bytes a box. Boxes may be of any sizes: a hash grid that held each in cells of its
+/// own size answered 1.3 to 4.9 times more slowly, where the boxes were those of photons' footprints.
 #[derive(Clone, Debug)]
 pub struct BoxTree {
     /// The root comes first; none if there is no box.

@@ -35,6 +35,7 @@
 //! | [`PhotonTree`] | the k nearest photons, or all within a radius: start with this one |
 //! | [`HashGrid`] | all photons within a radius known beforehand, rebuilt in every frame |
 //! | [`LeftBalancedTree`] | the classic photon map, without pointers, as a GPU would walk it; 16 bytes a photon |
+//! | [`BoxTree`] | all boxes that hold a point or overlap a box: footprints of photons, of any sizes |
 //!
 //! # Watertight
 //!

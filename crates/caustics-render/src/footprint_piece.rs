@@ -8,7 +8,7 @@ use crate::footprint_kernel::FootprintKernel;
 const MAX_PIECES: u32 = 256;
 
 /// Twice as many pieces must have boxes with less than this part of the area together.
-const WORTHWHILE: f32 = 0.75;
+const WORTHWHILE: f32 = 0.9;
 
 /// Height of the layer next to the plane, relative to the extent of a piece of it.
 const LAYER_HEIGHT: f32 = 0.25;
