@@ -1,4 +1,4 @@
-use glam::Vec3;
+use glam::{Mat2, Vec2, Vec3};
 
 use crate::footprint::FootprintOptions;
 use crate::footprint_kernel::FootprintKernel;
@@ -35,6 +35,17 @@ impl Covariance {
                 axis.dot(tangent),
                 axis.dot(bitangent),
             );
+        }
+    }
+
+    /// The covariance of what a linear map makes of it.
+    pub(crate) fn mapped(&self, map: &Mat2) -> Self {
+        let matrix = Mat2::from_cols(Vec2::new(self.xx, self.xy), Vec2::new(self.xy, self.yy));
+        let mapped = *map * matrix * map.transpose();
+        Self {
+            xx: mapped.x_axis.x,
+            xy: mapped.y_axis.x,
+            yy: mapped.y_axis.y,
         }
     }
 

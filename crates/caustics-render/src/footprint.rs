@@ -60,6 +60,11 @@ impl FootprintOptions {
     }
 }
 
+/// The cosine that a photon's flux arrives at, kept off zero.
+pub(crate) fn incident_cosine(photon: &Photon) -> f32 {
+    (-photon.incoming.dot(photon.normal)).max(MIN_INCIDENCE)
+}
+
 /// A photon's footprint as a density over its receiver's tangent plane.
 ///
 /// The covariance is that of the footprint's axes, enlarged by the pixel's own where there is one.

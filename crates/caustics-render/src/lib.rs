@@ -98,6 +98,7 @@ mod gbuffer;
 mod nearest;
 mod picture;
 mod pixel;
+mod pixel_integral;
 mod screen;
 mod splat;
 mod splat_level;

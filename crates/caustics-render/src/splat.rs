@@ -1,11 +1,14 @@
 use caustics_filter::Image;
 use caustics_trace::Photon;
-use glam::{Vec2, Vec3};
+use glam::{Mat2, Vec2, Vec3};
 use std::ops::Range;
 
+use crate::covariance::Covariance;
 use crate::error::RenderError;
-use crate::footprint::{Density, FootprintOptions, Gate};
+use crate::footprint::{Density, FootprintOptions, Gate, incident_cosine};
+use crate::footprint_kernel::FootprintKernel;
 use crate::gbuffer::{GBuffer, Texel};
+use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;
 use crate::splat_level::Level;
 
@@ -24,6 +27,14 @@ const LEVEL_SIGMA: f32 = 2.0;
 
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
+
+/// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles;
+/// narrower ones are integrated over the pixels.
+const INTEGRATED_SIGMA: f32 = 0.9;
+
+/// Half the widest rectangle of pixels that a footprint is integrated over, beyond which the
+/// perspective bends it.
+const INTEGRATED_EXTENT: f32 = 48.0;
 
 /// What became of the photons that were splatted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,6 +108,43 @@ pub(crate) struct Splat {
     step_y: Vec2,
     pub(crate) columns: [u16; 2],
     pub(crate) rows: [u16; 2],
+    /// Instead of all this, where it is as small as pixels.
+    pub(crate) integral: Option<PixelIntegral>,
+}
+
+/// A footprint that is integrated over pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PixelIntegral {
+    pub(crate) gaussian: PixelGaussian,
+    /// What a pixel with all of the flux would have for irradiance, over the incident cosine.
+    pub(crate) strength: Vec3,
+}
+
+impl PixelIntegral {
+    /// `None` for a footprint that can be read at the pixels' middles.
+    fn of(
+        photon: &Photon,
+        pixel: &[Vec3; 2],
+        center: Vec2,
+        options: &FootprintOptions,
+    ) -> Option<Self> {
+        if options.kernel != FootprintKernel::Gaussian {
+            return None;
+        }
+        let (tangent, bitangent) = photon.normal.any_orthonormal_pair();
+        let on_plane = |axis: Vec3| Vec2::new(axis.dot(tangent), axis.dot(bitangent));
+        let to_pixels = Mat2::from_cols(on_plane(pixel[0]), on_plane(pixel[1])).inverse();
+        let covariance =
+            Covariance::of_axes(&photon.axes, photon.normal, options).mapped(&to_pixels);
+        let (short, _) = covariance.eigenvalues();
+        if !(short < INTEGRATED_SIGMA * INTEGRATED_SIGMA) {
+            return None;
+        }
+        let gaussian = PixelGaussian::new(center, &covariance);
+        let strength = photon.flux * (to_pixels.determinant().abs() / incident_cosine(photon));
+        (gaussian.extent().max_element() < INTEGRATED_EXTENT && strength.is_finite())
+            .then_some(Self { gaussian, strength })
+    }
 }
 
 pub(crate) enum Prepared {
@@ -139,13 +187,19 @@ impl Splat {
         let steps = pixel.map(|[x, y]| [density.along(x), density.along(y)].map(Vec2::from));
         let center = screen.project(photon.position);
         let is_local = bounds.is_exact && steps.is_some() && center.is_some();
+        let integral = match (pixel, center) {
+            (Some(pixel), Some(center)) if is_local => {
+                PixelIntegral::of(photon, &pixel, center, options)
+            }
+            _ => None,
+        };
         let ([step_x, step_y], center) = (steps.unwrap_or_default(), center.unwrap_or_default());
         let sigma = if is_local {
             least_sigma(step_x, step_y)
         } else {
             f32::INFINITY
         };
-        if sigma < SMALL_SIGMA {
+        if sigma < SMALL_SIGMA && integral.is_none() {
             density.scale_by(normalisation(&density, center, step_x, step_y));
         }
         let mut splat = Self {
@@ -158,9 +212,16 @@ impl Splat {
             step_y,
             columns: [0; 2],
             rows: [0; 2],
+            integral,
         };
-        splat.choose_level(sigma);
-        splat.place(&bounds, screen);
+        if let Some(integral) = integral {
+            let extent = integral.gaussian.extent();
+            let (low, high) = (center - extent, center + extent);
+            splat.place(&Bounds { low, high, is_exact: true }, screen);
+        } else {
+            splat.choose_level(sigma);
+            splat.place(&bounds, screen);
+        }
         Prepared::Splat(splat)
     }
 
@@ -212,14 +273,21 @@ impl Splat {
         low..high
     }
 
-    /// What the photon adds to the irradiance of a texel.
+    /// What the photon adds to the irradiance of a texel, whose pixel gets `weight` of its flux
+    /// where it is integrated.
     #[inline]
-    pub(crate) fn irradiance(&self, texel: &Texel) -> Vec3 {
+    pub(crate) fn irradiance(&self, texel: &Texel, weight: Option<f32>) -> Vec3 {
         if self
             .gate
             .admits(&self.density, texel.position, texel.normal)
         {
-            self.density.irradiance(texel.position, texel.normal)
+            match (&self.integral, weight) {
+                (Some(integral), Some(weight)) => {
+                    let cosine = (-texel.normal.dot(self.density.incoming)).max(0.0);
+                    integral.strength * (cosine * weight)
+                }
+                _ => self.density.irradiance(texel.position, texel.normal),
+            }
         } else {
             Vec3::ZERO
         }

@@ -1,4 +1,5 @@
 use std::f32::consts::FRAC_1_PI;
+use std::ops::Range;
 
 use caustics_filter::Image;
 use glam::{Vec2, Vec3};
@@ -6,7 +7,7 @@ use glam::{Vec2, Vec3};
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
 use crate::error::RenderError;
 use crate::gbuffer::{GBuffer, Texel};
-use crate::splat::{Prepared, STRIDE};
+use crate::splat::{PixelIntegral, Prepared, STRIDE, Splat};
 
 /// Rows of one task.
 const BAND: usize = 16;
@@ -116,6 +117,7 @@ impl Level {
             tasks.push(BandTask {
                 first_row: number * BAND,
                 width: self.width,
+                texels: &self.texels,
                 columns: &self.columns,
                 irradiance,
                 extras: &self.extras[extras],
@@ -220,6 +222,7 @@ impl Level {
 struct BandTask<'a> {
     first_row: usize,
     width: usize,
+    texels: &'a [Option<Texel>],
     columns: &'a TexelColumns,
     /// From the band's first row on.
     irradiance: ColumnsMut<'a>,
@@ -231,12 +234,17 @@ struct BandTask<'a> {
 impl BandTask<'_> {
     fn run(mut self, prepared: &[Prepared]) {
         let rows = self.irradiance.x.len() / self.width;
+        let mut weights = Vec::new();
         for &index in self.splats {
             let Prepared::Splat(splat) = &prepared[index as usize] else {
                 continue;
             };
             let first = usize::from(splat.rows[0]).max(self.first_row);
             let last = usize::from(splat.rows[1]).min(self.first_row + rows);
+            if let Some(integral) = &splat.integral {
+                self.light_integrated(splat, integral, first..last, &mut weights);
+                continue;
+            }
             for row in first..last {
                 let span = splat.span(row);
                 let start = (row - self.first_row) * self.width;
@@ -260,9 +268,52 @@ impl BandTask<'_> {
                     }
                     let column = pixel % self.width as u32;
                     if (columns[0]..columns[1]).contains(&column) {
-                        self.extra_irradiance[begin + offset] += splat.irradiance(texel);
+                        self.extra_irradiance[begin + offset] += splat.irradiance(texel, None);
                     }
                 }
+            }
+        }
+    }
+
+    /// Lights the pixels of some rows by a footprint that is integrated over each.
+    fn light_integrated(
+        &mut self,
+        splat: &Splat,
+        integral: &PixelIntegral,
+        rows: Range<usize>,
+        weights: &mut Vec<f32>,
+    ) {
+        let columns = usize::from(splat.columns[0])..usize::from(splat.columns[1]);
+        if rows.is_empty() || columns.is_empty() {
+            return;
+        }
+        weights.clear();
+        weights.resize(rows.len() * columns.len(), 0.0);
+        integral.gaussian.add_weights(&columns, &rows, weights);
+        for (row, weights) in rows.clone().zip(weights.chunks(columns.len())) {
+            let start = row * self.width;
+            for (column, &weight) in columns.clone().zip(weights) {
+                if weight > 0.0
+                    && let Some(texel) = &self.texels[start + column]
+                {
+                    let target = (row - self.first_row) * self.width + column;
+                    let added = splat.irradiance(texel, Some(weight));
+                    self.irradiance.x[target] += added.x;
+                    self.irradiance.y[target] += added.y;
+                    self.irradiance.z[target] += added.z;
+                }
+            }
+        }
+        let begin = |row: usize| {
+            self.extras
+                .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
+        };
+        for index in begin(rows.start)..begin(rows.end) {
+            let (pixel, texel) = &self.extras[index];
+            let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
+            if columns.contains(&column) {
+                let place = (row - rows.start) * columns.len() + column - columns.start;
+                self.extra_irradiance[index] += splat.irradiance(texel, Some(weights[place]));
             }
         }
     }
