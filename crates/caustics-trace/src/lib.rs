@@ -56,7 +56,9 @@
 //! | --- | --- | --- |
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
-//! | aim lights at what makes caustics | [`Aim`], [`Emitter`], [`Emission`], [`EmissionSample`] | |
+//! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
+//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`] | |
+//! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
@@ -107,22 +109,30 @@
 //! - Schmidt, Budge, *Simple Nested Dielectrics in Ray Traced Images*, Journal of Graphics Tools
 //!   2002.
 
-mod aim;
 mod area_emission;
+mod casters;
 mod differential;
+mod domain;
 mod emission;
+mod emitter;
 mod ledger;
 mod media;
 mod optics;
 mod options;
+mod outline;
 mod photon;
+mod plan;
 mod refine;
 mod scatter;
 mod trace;
 mod tracer;
 
+pub use area_emission::AreaSurface;
+pub use casters::{Casters, MAX_CASTERS};
 pub use differential::RayDifferential;
-pub use emission::{Emission, EmissionSample, Emitter};
+pub use domain::EmissionDomain;
+pub use emission::{Emission, EmissionSample};
+pub use emitter::{Emitter, LightSource};
 pub use glam;
 pub use ledger::{EnergyLedger, Fate, LedgerEntry};
 pub use media::{Crossing, MediumStack};
@@ -132,5 +142,6 @@ pub use optics::{
 };
 pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
 pub use photon::{Photon, PhotonMap};
+pub use plan::{EmissionBatch, EmissionPlan};
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::trace_photons;
+pub use trace::{trace_photons, trace_plan};

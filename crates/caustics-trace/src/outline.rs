@@ -1,4 +1,4 @@
-use caustics_geometry::Sphere;
+use caustics_geometry::{Aabb, Sphere};
 use caustics_sampling::warp::Cone;
 use caustics_scene::World;
 use glam::{Vec2, Vec3};
@@ -19,40 +19,38 @@ const MIN_CONE_COSINE: f32 = 0.05;
 /// By how much an aimed domain is wider than what it holds, so that rounding cuts nothing off.
 const MARGIN: f32 = 1e-4;
 
-/// The specular objects of a world, as what bounds them: vertices and spheres.
+/// Some objects of a world, as what bounds them: vertices and spheres.
 #[derive(Clone, Debug)]
-pub(crate) struct Casters {
+pub(crate) struct Outline {
     vertices: Vec<Vec3>,
     spheres: Vec<Sphere>,
     bounding: Sphere,
 }
 
-impl Casters {
-    /// `None` where nothing is specular.
-    pub(crate) fn of(world: &World) -> Option<Self> {
-        let mut vertices = Vec::new();
+impl Outline {
+    /// The outline of the objects with these indices; `None` where they have no surface.
+    pub(crate) fn of(world: &World, objects: &[u32]) -> Option<Self> {
         let mut spheres = Vec::new();
-        let mut is_used = vec![false; world.positions().len()];
-        for object in world.objects() {
-            if !world.materials()[object.material as usize]
-                .surface
-                .is_specular()
-            {
-                continue;
-            }
+        let mut used: Vec<u32> = Vec::new();
+        let mut bounds = Aabb::EMPTY;
+        for &object in objects {
+            let object = &world.objects()[object as usize];
             let triangles = object.triangles.start as usize..object.triangles.end as usize;
-            for &vertex in world.triangles()[triangles].as_flattened() {
-                if !std::mem::replace(&mut is_used[vertex as usize], true) {
-                    vertices.push(world.positions()[vertex as usize]);
-                }
-            }
+            used.extend(world.triangles()[triangles].as_flattened());
             let range = object.spheres.start as usize..object.spheres.end as usize;
             spheres.extend_from_slice(&world.spheres()[range]);
+            bounds = bounds.union(&object.bounds);
         }
+        used.sort_unstable();
+        used.dedup();
+        let vertices: Vec<Vec3> = used
+            .into_iter()
+            .map(|vertex| world.positions()[vertex as usize])
+            .collect();
         if vertices.is_empty() && spheres.is_empty() {
             return None;
         }
-        let center = world.specular_bounds().center();
+        let center = bounds.center();
         let reach = |point: &Vec3| point.distance(center);
         let farthest = vertices.iter().map(reach).fold(0.0, f32::max);
         let radius = spheres
