@@ -9,7 +9,7 @@ use crate::casters::Casters;
 use crate::domain::EmissionDomain;
 use crate::emission::{Emission, EmissionSample};
 use crate::options::Aim;
-use crate::outline::Outline;
+use crate::outline::{Outline, half_angle};
 
 /// Which light of a world an emitter is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -48,6 +48,17 @@ impl Emitter {
     /// or with [`Aim::Everywhere`] one in all.
     #[must_use]
     pub fn all(world: &World, casters: &Casters, aim: Aim) -> Vec<Self> {
+        Self::following(world, casters, aim, &[])
+    }
+
+    /// Like [`all`](Self::all), but with the domains of the emitters `before` wherever the caster
+    /// still fits in, so that the rays stay the same while it moves a little.
+    pub(crate) fn following(
+        world: &World,
+        casters: &Casters,
+        aim: Aim,
+        before: &[&Self],
+    ) -> Vec<Self> {
         let mut sources: Vec<LightSource> = (0..world.lights().len() as u32)
             .map(|index| LightSource::Light { index })
             .collect();
@@ -64,13 +75,11 @@ impl Emitter {
             match aim {
                 Aim::Everywhere => emitters.push(Self::new(world, source, None)),
                 _ => {
-                    let before = emitters.len();
-                    emitters.extend(
-                        casters
-                            .outlines()
-                            .map(|target| Self::new(world, source, Some(target))),
-                    );
-                    if emitters.len() == before {
+                    let first = emitters.len();
+                    emitters.extend(casters.outlines().map(|target| {
+                        Self::new(world, source, Some(target)).settled(world, target.1, before)
+                    }));
+                    if emitters.len() == first {
                         let nothing = EmissionDomain::Nothing;
                         let power = power(world, source);
                         emitters.push(Self::with_domain(world, source, None, nothing, power));
@@ -174,6 +183,21 @@ impl Emitter {
         Self::with_domain(world, source, caster, domain, power(world, source))
     }
 
+    /// With the domain that the same pair had before, or one that is a little wider than need be,
+    /// so that it may serve for some time.
+    fn settled(self, world: &World, outline: &Outline, before: &[&Self]) -> Self {
+        let same = |it: &&&Self| it.source == self.source && it.caster == self.caster;
+        let Some(old) = before.iter().find(same) else {
+            return self;
+        };
+        let domain = if is_kept(&old.domain, &self.domain, outline) {
+            old.domain
+        } else {
+            widened(&self.domain)
+        };
+        Self::with_domain(world, self.source, self.caster, domain, self.power)
+    }
+
     fn with_domain(
         world: &World,
         source: LightSource,
@@ -190,6 +214,106 @@ impl Emitter {
             aimed_power,
         }
     }
+}
+
+/// By how much a domain is wider than need be that should hold a moving caster for some frames.
+const SLACK: f32 = 1.05;
+
+/// A domain is given up for one that is smaller than it by this factor.
+const LARGEST: f32 = 1.4;
+
+/// Whether a domain still serves: for the same light, with the caster in it, and not too large.
+fn is_kept(old: &EmissionDomain, tight: &EmissionDomain, outline: &Outline) -> bool {
+    match (*old, *tight) {
+        (
+            EmissionDomain::Cone {
+                light,
+                origin,
+                frame,
+                cone,
+            },
+            EmissionDomain::Cone {
+                light: same_light,
+                cone: least,
+                ..
+            },
+        ) => {
+            light == same_light
+                && cone.solid_angle() <= LARGEST * least.solid_angle()
+                && outline.is_in_cone(origin, frame.normal, cone)
+        }
+        (
+            EmissionDomain::Rectangle {
+                corner,
+                edges,
+                direction,
+                irradiance,
+            },
+            EmissionDomain::Rectangle {
+                corner: fresh_corner,
+                edges: least,
+                direction: same_direction,
+                irradiance: same_irradiance,
+            },
+        ) => {
+            let area = |edges: &[Vec3; 2]| edges[0].length() * edges[1].length();
+            direction == same_direction
+                && irradiance == same_irradiance
+                // Outside the scene still.
+                && corner.dot(direction) <= fresh_corner.dot(direction)
+                && area(&edges) <= LARGEST * area(&least)
+                && outline.is_in_rectangle(corner, &edges)
+        }
+        (
+            EmissionDomain::Area {
+                surface: AreaSurface::Cap { .. },
+                ..
+            },
+            _,
+        ) => false,
+        (
+            EmissionDomain::Area {
+                surface,
+                target: Some(target),
+            },
+            EmissionDomain::Area {
+                surface: same_surface,
+                target: Some(least),
+            },
+        ) => {
+            surface == same_surface
+                && target.center.distance(least.center) + least.radius <= target.radius
+                && target.radius * target.radius <= LARGEST * least.radius * least.radius
+        }
+        _ => false,
+    }
+}
+
+/// A domain with some room around its caster.
+fn widened(domain: &EmissionDomain) -> EmissionDomain {
+    let mut wider = *domain;
+    match &mut wider {
+        EmissionDomain::Cone { light, cone, .. } => {
+            let is_own =
+                matches!(light, Light::Spot { outer_cos, .. } if cone.cosine() <= *outer_cos);
+            let angle = SLACK * half_angle(*cone);
+            if !is_own && angle < std::f32::consts::FRAC_PI_2 {
+                *cone = Cone::from_half_angle(angle).unwrap_or(*cone);
+            }
+        }
+        EmissionDomain::Rectangle { corner, edges, .. } => {
+            let more = edges.map(|edge| (SLACK - 1.0) * edge);
+            *corner -= 0.5 * (more[0] + more[1]);
+            *edges = [edges[0] + more[0], edges[1] + more[1]];
+        }
+        EmissionDomain::Area {
+            surface:
+                AreaSurface::Rectangle { .. } | AreaSurface::Disc { .. } | AreaSurface::Object { .. },
+            target: Some(target),
+        } => target.radius *= SLACK,
+        _ => {}
+    }
+    wider
 }
 
 /// Everything that a light emits, in watts.

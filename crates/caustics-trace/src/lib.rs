@@ -58,6 +58,7 @@
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
 //! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
 //! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`] | |
+//! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
@@ -115,6 +116,7 @@ mod differential;
 mod domain;
 mod emission;
 mod emitter;
+mod lattice;
 mod ledger;
 mod media;
 mod optics;
@@ -122,6 +124,7 @@ mod options;
 mod outline;
 mod photon;
 mod plan;
+mod projection_map;
 mod refine;
 mod scatter;
 mod trace;
@@ -143,5 +146,6 @@ pub use optics::{
 pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
 pub use photon::{Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
+pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
 pub use trace::{trace_photons, trace_plan};

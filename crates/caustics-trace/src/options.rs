@@ -26,6 +26,9 @@ pub enum Aim {
     Everywhere,
     /// At each specular object, or group of objects that nest, into the cone (or, for a directional
     /// light, the rectangle) that just holds it. Nothing that could become a caustic is left out.
+    Cones,
+    /// Likewise, but only into those parts of the cone or the rectangle where the caster's own
+    /// outline is, where finding it costs less than it saves.
     #[default]
     Casters,
 }

@@ -1,3 +1,5 @@
+use std::f32::consts::PI;
+
 use caustics_geometry::{Aabb, Sphere};
 use caustics_sampling::warp::Cone;
 use caustics_scene::World;
@@ -135,6 +137,36 @@ impl Outline {
         (back(low), [back(Vec2::X) * size.x, back(Vec2::Y) * size.y])
     }
 
+    /// Whether everything lies in a cone from `origin`.
+    pub(crate) fn is_in_cone(&self, origin: Vec3, axis: Vec3, cone: Cone) -> bool {
+        let angle = half_angle(cone) * (1.0 - MARGIN);
+        let chord = 2.0 * (0.5 * angle).sin();
+        self.vertices.iter().all(|vertex| {
+            (vertex - origin)
+                .try_normalize()
+                .is_some_and(|direction| direction.distance_squared(axis) < chord * chord)
+        }) && self.spheres.iter().all(|sphere| {
+            let to_center = sphere.center - origin;
+            let distance = to_center.length();
+            distance > sphere.radius
+                && to_center.angle_between(axis) + (sphere.radius / distance).asin() < angle
+        })
+    }
+
+    /// Whether everything lies before a rectangle, seen along its normal.
+    pub(crate) fn is_in_rectangle(&self, corner: Vec3, edges: &[Vec3; 2]) -> bool {
+        edges.iter().all(|&edge| {
+            let length = edge.length();
+            let range = 0.0..=length;
+            let along = |point: Vec3| (point - corner).dot(edge) / length;
+            self.vertices.iter().all(|&it| range.contains(&along(it)))
+                && self.spheres.iter().all(|sphere| {
+                    let center = along(sphere.center);
+                    center >= sphere.radius && center + sphere.radius <= length
+                })
+        })
+    }
+
     /// Some of the vertices, and the outermost points of the spheres.
     fn sampled(&self) -> impl Iterator<Item = Vec3> {
         let stride = self.vertices.len().div_ceil(SHAPE_VERTICES).max(1);
@@ -152,6 +184,12 @@ impl Outline {
             .flat_map(move |sphere| poles.map(|pole| sphere.center + sphere.radius * pole));
         self.vertices.iter().step_by(stride).copied().chain(around)
     }
+}
+
+/// The half angle of a cone in radians, with all its digits where it is narrow.
+pub(crate) fn half_angle(cone: Cone) -> f32 {
+    // 1 - cos a = 2 sin² (a / 2), and the solid angle is 2 pi of it.
+    2.0 * (cone.solid_angle() / (4.0 * PI)).sqrt().min(1.0).asin()
 }
 
 /// The box around points in a frame turned by `turn` radians.

@@ -3,6 +3,7 @@ use caustics_sampling::Sequence;
 use caustics_scene::World;
 use glam::DVec3;
 
+use crate::emission::EmissionSample;
 use crate::ledger::Fate;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
@@ -138,11 +139,12 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> PhotonMap {
         let mut tracer = self.tracer::<N>();
         for index in range {
-            let sample = self.planned.sample(index);
+            let number = self.planned.point_number(index);
+            let sample = EmissionSample::of(self.planned.points(), number);
             let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) else {
                 continue;
             };
-            let mut rng = self.planned.random(self.options.seed, u64::from(index));
+            let mut rng = self.planned.random(self.options.seed, u64::from(number));
             tracer.trace(&emission, self.planned.media(), &mut rng);
         }
         PhotonMap {

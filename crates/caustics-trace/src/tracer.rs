@@ -184,10 +184,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         };
         match object.and_then(|object| casters.of_object(object)) {
             Some(met) => met != caster,
-            None => self
-                .earlier
-                .iter()
-                .any(|it| it.emitter().domain().covers(ray)),
+            None => self.earlier.iter().any(|it| it.covers(ray)),
         }
     }
 
