@@ -190,7 +190,8 @@ impl Emitter {
         let Some(old) = before.iter().find(same) else {
             return self;
         };
-        let domain = if is_kept(&old.domain, &self.domain, outline) {
+        let is_still = old.domain == self.domain;
+        let domain = if is_still || is_kept(&old.domain, &self.domain, outline) {
             old.domain
         } else {
             widened(&self.domain)

@@ -171,6 +171,31 @@ impl EnergyLedger {
         self.roulette_gain += flux.as_dvec3();
     }
 
+    /// What one photon did, as a short list, and back.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = (u8, LedgerEntry)> {
+        let gain = LedgerEntry {
+            count: 0,
+            flux: self.roulette_gain,
+        };
+        let all = [self.emitted, gain].into_iter().chain(self.fates);
+        (0u8..)
+            .zip(all)
+            .filter(|(_, entry)| entry.count > 0 || entry.flux != DVec3::ZERO)
+    }
+
+    /// Adds a line of [`lines`](Self::lines).
+    pub(crate) fn add_line(&mut self, line: u8, entry: &LedgerEntry) {
+        match line {
+            0 => self.emitted.merge(entry),
+            1 => self.roulette_gain += entry.flux,
+            _ => {
+                if let Some(fate) = self.fates.get_mut(usize::from(line) - 2) {
+                    fate.merge(entry);
+                }
+            }
+        }
+    }
+
     /// Takes back another ledger's entries: its photons are to count as not emitted. Its rays stay
     /// and are added: they were traced.
     pub(crate) fn retract(&mut self, other: &Self) {

@@ -85,7 +85,7 @@ impl EmissionPlan {
         options.validate()?;
         let casters = Casters::of(world);
         let emitters = Emitter::all(world, &casters, options.aim);
-        let mut plan = Self::weighed(world, intersect, casters, emitters, options);
+        let mut plan = Self::weighed(world, intersect, casters, emitters, &[], options);
         plan.share(world, options);
         Ok(plan)
     }
@@ -95,8 +95,8 @@ impl EmissionPlan {
     /// rectangle that it covers, so that what did not move does not change by a bit and what moved
     /// changes smoothly.
     ///
-    /// Where a pair has come or gone, or one counts for more than twice or less than half of what it
-    /// did, all photons are shared anew.
+    /// Where a pair has come or gone, or one that covers other directions now counts for more than
+    /// twice or less than half of what it did, all photons are shared anew.
     ///
     /// # Errors
     /// If the options are out of range.
@@ -110,7 +110,7 @@ impl EmissionPlan {
         let casters = Casters::of(world);
         let before: Vec<&Emitter> = self.batches.iter().map(EmissionBatch::emitter).collect();
         let emitters = Emitter::following(world, &casters, options.aim, &before);
-        let mut plan = Self::weighed(world, intersect, casters, emitters, options);
+        let mut plan = Self::weighed(world, intersect, casters, emitters, &self.batches, options);
         let total: u32 = self.batches.iter().map(|batch| batch.share).sum();
         let is_alike = plan.batches.len() == self.batches.len()
             && (total == options.photons || total == 0)
@@ -122,8 +122,7 @@ impl EmissionPlan {
                 same_pair && (least..=most).contains(&new.weight)
             });
         if !is_alike {
-            plan.share(world, options);
-            return Ok(plan);
+            return Self::new(world, intersect, options);
         }
         let settle = |(new, old): (&mut EmissionBatch, &EmissionBatch)| {
             // The old weight stays, or slow changes would never add up to a new sharing.
@@ -173,6 +172,7 @@ impl EmissionPlan {
         intersect: &I,
         casters: Casters,
         emitters: Vec<Emitter>,
+        before: &[EmissionBatch],
         options: &TraceOptions,
     ) -> Self {
         let is_lit = |it: &&Emitter| it.aimed_power().element_sum() > 0.0;
@@ -180,7 +180,13 @@ impl EmissionPlan {
         let pilots = (options.photons / PILOT_PART / lit.max(1)).clamp(1, PILOTS);
         let weigh = |emitter: Emitter| {
             let mut batch = EmissionBatch::new(world, intersect, emitter, &casters, options);
-            if options.aim != Aim::Everywhere && batch.weight > 0.0 {
+            // A pair that covers the same directions as before counts for as much.
+            let known = before.iter().find(|old| {
+                old.stream == batch.stream && old.emitter.domain() == batch.emitter.domain()
+            });
+            if let Some(known) = known {
+                (batch.weight, batch.accuracy) = (known.weight, known.accuracy);
+            } else if options.aim != Aim::Everywhere && batch.weight > 0.0 {
                 batch.send_pilots(world, intersect, &casters, options, pilots);
             }
             batch

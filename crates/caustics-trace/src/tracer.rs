@@ -15,6 +15,7 @@ use crate::options::{Branching, TraceOptions};
 use crate::photon::Photon;
 use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
+use crate::trail::Trail;
 
 /// The longest change of direction, in radians for one sample spacing, that a differential keeps.
 /// Beyond it a first derivative says nothing about where the neighbour goes.
@@ -53,6 +54,8 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     caster: Option<(&'a Casters, u32)>,
     /// The emitters of the same light whose photons come before these.
     earlier: &'a [EmissionBatch],
+    /// Where the paths go, if that is asked for.
+    pub(crate) trail: Option<Trail<'a>>,
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
@@ -73,6 +76,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             ledger: EnergyLedger::default(),
             caster: None,
             earlier: &[],
+            trail: None,
         }
     }
 
@@ -123,7 +127,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             return;
         }
         self.ledger.rays += 1;
-        let Some(hit) = self.intersect.closest_hit(&branch.ray) else {
+        let hit = self.intersect.closest_hit(&branch.ray);
+        if let Some(trail) = &mut self.trail {
+            trail.passes(self.world, &branch.ray, hit.as_ref());
+        }
+        let Some(hit) = hit else {
             let fate = if branch.depth == 0 && self.is_overlap(&branch.ray, None) {
                 Fate::Overlap
             } else if branch.events == 0 {
