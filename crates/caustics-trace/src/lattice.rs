@@ -126,6 +126,41 @@ impl Lattice {
         }
     }
 
+    /// The used points before and after used point `index` of a grid, along each of its axes.
+    ///
+    /// Where rows differ in length, a neighbour across rows is the nearest.
+    pub(crate) fn neighbours(&self, index: u32) -> [[Option<u32>; 2]; 2] {
+        let grid = Grid::new(self.points.count());
+        let number = self.number(index);
+        let cell = grid.cell(number);
+        let columns = grid.columns(cell.row);
+        let along = [
+            (cell.column > 0).then(|| number - 1),
+            (cell.column + 1 < columns).then(|| number + 1),
+        ];
+        let below = cell.row.checked_sub(1).map(|row| {
+            let length = grid.columns(row);
+            number - cell.column - length + cell.column.min(length - 1)
+        });
+        let above = (cell.row + 1 < grid.rows()).then(|| {
+            let length = grid.columns(cell.row + 1);
+            number - cell.column + columns + cell.column.min(length - 1)
+        });
+        [along, [below, above]].map(|pair| pair.map(|it| self.index_of(it?)))
+    }
+
+    /// Which used point number `number` of the whole set is.
+    fn index_of(&self, number: u32) -> Option<u32> {
+        let Some(spans) = &self.spans else {
+            return (number < self.count).then_some(number);
+        };
+        let after = spans.partition_point(|it| it.first <= number);
+        let span = spans.get(after.checked_sub(1)?)?;
+        let index = span.before + (number - span.first);
+        let end = spans.get(after).map_or(self.count, |next| next.before);
+        (index < end).then_some(index)
+    }
+
     /// The sample of used point `index`.
     pub(crate) fn sample(&self, index: u32) -> EmissionSample {
         EmissionSample::of(&self.points, self.number(index))

@@ -109,6 +109,8 @@ pub struct EnergyLedger {
     pub normal_fallbacks: u64,
     /// Differentials that were shortened to the limit, at a critical angle or a grazing event.
     pub bounded_differentials: u64,
+    /// Footprints that were taken from a neighbour's landing because their differential was longer.
+    pub replaced_differentials: u64,
     /// Rays traced, shadow rays not among them.
     pub rays: u64,
 }
@@ -205,6 +207,9 @@ impl EnergyLedger {
             mine.retract(theirs);
         }
         self.normal_fallbacks = self.normal_fallbacks.saturating_sub(other.normal_fallbacks);
+        self.replaced_differentials = self
+            .replaced_differentials
+            .saturating_sub(other.replaced_differentials);
         self.bounded_differentials = self
             .bounded_differentials
             .saturating_sub(other.bounded_differentials);
@@ -220,6 +225,7 @@ impl EnergyLedger {
         }
         self.normal_fallbacks += other.normal_fallbacks;
         self.bounded_differentials += other.bounded_differentials;
+        self.replaced_differentials += other.replaced_differentials;
         self.rays += other.rays;
     }
 }

@@ -123,6 +123,7 @@ mod lattice;
 mod ledger;
 mod live;
 mod media;
+mod neighbours;
 mod optics;
 mod options;
 mod outline;
@@ -132,6 +133,7 @@ mod projection_map;
 mod refine;
 mod scatter;
 mod trace;
+mod traced;
 mod tracer;
 mod trail;
 
@@ -151,7 +153,7 @@ pub use optics::{
     refract,
 };
 pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
-pub use photon::{Photon, PhotonMap};
+pub use photon::{FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};

@@ -21,6 +21,40 @@ pub struct Photon {
     pub object: u32,
     /// Specular events on its way, at least 1.
     pub events: u32,
+    /// How `axes` were found.
+    pub source: FootprintSource,
+}
+
+/// How a photon's footprint was found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FootprintSource {
+    /// From its ray differential, which nothing was there to check against: the photons are not on
+    /// a lattice of two parameters, or no neighbour took the same path.
+    #[default]
+    Differential,
+    /// From its ray differential, and neighbours landed where it says or farther away.
+    Checked,
+    /// From its ray differential, of which a derivative of the direction was shortened on the way:
+    /// at a critical angle or where a surface bends too fast.
+    Bounded,
+    /// From the finite difference to a neighbour on the lattice, which landed nearer than the
+    /// differential said.
+    Neighbour,
+    /// From its ray differential, widened for the paths that ended by Russian roulette where this
+    /// one went on.
+    Thinned,
+}
+
+impl FootprintSource {
+    /// All sources.
+    pub const ALL: [Self; 5] = [
+        Self::Differential,
+        Self::Checked,
+        Self::Bounded,
+        Self::Neighbour,
+        Self::Thinned,
+    ];
 }
 
 /// The photons of one tracing, and where the energy went.

@@ -296,6 +296,11 @@ impl EmissionBatch {
         self.media
     }
 
+    /// The points of its photons.
+    pub(crate) fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
     /// Whether a ray of the same light is one that these photons stand for, within rounding.
     pub(crate) fn covers(&self, ray: &Ray) -> bool {
         let domain = self.emitter.domain();

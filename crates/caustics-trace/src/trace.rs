@@ -7,6 +7,7 @@ use crate::emission::EmissionSample;
 use crate::ledger::Fate;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
+use crate::traced::Traced;
 use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
 use crate::tracer::PathTracer;
@@ -121,24 +122,26 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
             traced
         };
         #[cfg(feature = "parallel")]
-        let parts: Vec<PhotonMap> = {
+        let parts: Vec<Traced> = {
             use rayon::prelude::*;
             (0..chunks).into_par_iter().map(run).collect()
         };
         #[cfg(not(feature = "parallel"))]
-        let parts: Vec<PhotonMap> = (0..chunks).map(run).collect();
+        let parts: Vec<Traced> = (0..chunks).map(run).collect();
 
-        map.photons
-            .reserve(parts.iter().map(|part| part.photons.len()).sum());
-        for mut part in parts {
-            map.photons.append(&mut part.photons);
-            map.ledger.merge(&part.ledger);
+        let mut all = Traced::joined(parts);
+        if N == 2 && self.planned.points().sequence() == Sequence::Grid {
+            all.check_footprints(self.planned.lattice());
         }
+        map.photons.append(&mut all.photons);
+        map.ledger.merge(&all.ledger);
     }
 
-    fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> PhotonMap {
+    fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> Traced {
         let mut tracer = self.tracer::<N>();
+        let mut starts = Vec::with_capacity(range.len());
         for index in range {
+            starts.push(tracer.photons.len());
             let number = self.planned.point_number(index);
             let sample = EmissionSample::of(self.planned.points(), number);
             let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) else {
@@ -147,8 +150,10 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
             let mut rng = self.planned.random(self.options.seed, u64::from(number));
             tracer.trace(&emission, self.planned.media(), &mut rng);
         }
-        PhotonMap {
+        Traced {
             photons: tracer.photons,
+            paths: tracer.paths,
+            starts,
             ledger: tracer.ledger,
         }
     }

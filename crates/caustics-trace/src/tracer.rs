@@ -12,7 +12,7 @@ use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::optics::beer_lambert;
 use crate::options::{Branching, TraceOptions};
-use crate::photon::Photon;
+use crate::photon::{FootprintSource, Photon};
 use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
 use crate::trail::Trail;
@@ -37,6 +37,7 @@ struct Branch<const N: usize> {
     channel: Option<u8>,
     /// A hash of what the path met and did there.
     path: u32,
+    source: FootprintSource,
 }
 
 /// Traces photons one at a time; holds the memory that they share.
@@ -114,6 +115,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             has_split: false,
             channel: None,
             path: 0,
+            source: FootprintSource::Differential,
         });
         while let Some(branch) = self.pending.pop() {
             self.advance(branch, threshold, rng);
@@ -227,6 +229,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             axes: branch.differential.footprint_axes(point.geometric_normal),
             object: point.object,
             events: branch.events,
+            source: branch.source,
         });
         self.paths.push(extended(branch.path, point.object, 0));
     }
@@ -311,6 +314,13 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             .scaled(kept.powf(-1.0 / N as f32));
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
+        let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {
+            FootprintSource::Thinned
+        } else if shortened {
+            FootprintSource::Bounded
+        } else {
+            branch.source
+        };
         let origin = point
             .spawn
             .origin_towards(point.geometric_normal, outgoing.direction);
@@ -324,6 +334,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             has_split: branch.has_split,
             channel: branch.channel,
             path: extended(branch.path, point.object, 1 + outgoing.event as u32),
+            source,
         });
     }
 
