@@ -169,6 +169,7 @@ mod tests {
             axes: [Vec3::X, Vec3::Z],
             object: 0,
             events: 1,
+            source: caustics_trace::FootprintSource::Differential,
         }
     }
 

@@ -385,6 +385,7 @@ mod tests {
             axes,
             object: 0,
             events: 1,
+            source: caustics_trace::FootprintSource::Differential,
         }
     }
 
@@ -537,6 +538,7 @@ mod tests {
                     axes: [axis(one, a), axis(other, b)],
                     object: 0,
                     events: 1,
+                    source: caustics_trace::FootprintSource::Differential,
                 }
             })
     }

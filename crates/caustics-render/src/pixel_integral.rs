@@ -47,7 +47,11 @@ impl PixelGaussian {
         } else {
             (Vec2::new(center.y, center.x), covariance.yy, covariance.xx)
         };
-        let slope = if long > 0.0 { covariance.xy / long } else { 0.0 };
+        let slope = if long > 0.0 {
+            covariance.xy / long
+        } else {
+            0.0
+        };
         // What is left of the shorter variance in one place, and what the strip's own extent adds.
         let within = (short - slope * covariance.xy).max(0.0);
         let long = long.sqrt().max(LEAST_SIGMA);

@@ -217,7 +217,14 @@ impl Splat {
         if let Some(integral) = integral {
             let extent = integral.gaussian.extent();
             let (low, high) = (center - extent, center + extent);
-            splat.place(&Bounds { low, high, is_exact: true }, screen);
+            splat.place(
+                &Bounds {
+                    low,
+                    high,
+                    is_exact: true,
+                },
+                screen,
+            );
         } else {
             splat.choose_level(sigma);
             splat.place(&bounds, screen);

@@ -119,6 +119,7 @@ mod tests {
                 },
                 object: 0,
                 events: 1,
+                source: caustics_trace::FootprintSource::Differential,
             })
             .collect()
     }

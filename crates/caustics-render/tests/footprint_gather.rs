@@ -19,6 +19,7 @@ fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
         axes,
         object: 0,
         events: 1,
+        source: caustics_trace::FootprintSource::Differential,
     }
 }
 
@@ -288,6 +289,7 @@ fn a_sphere_is_lit_by_its_own_slope() {
                 axes: [slide(SPACING * Vec3::X), slide(SPACING * Vec3::Z)],
                 object: 0,
                 events: 1,
+                source: caustics_trace::FootprintSource::Differential,
             });
         }
     }

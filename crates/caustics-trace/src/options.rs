@@ -57,6 +57,9 @@ pub struct TraceOptions {
     pub sequence: Sequence,
     /// Where the lattice is made finer.
     pub refinement: Refinement,
+    /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
+    /// those are nearer, and drawn in at the edges of sheets of light.
+    pub check_footprints: bool,
 }
 
 /// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
@@ -97,6 +100,7 @@ impl Default for TraceOptions {
             share_floor: 0.25,
             sequence: Sequence::Grid,
             refinement: Refinement::default(),
+            check_footprints: true,
         }
     }
 }

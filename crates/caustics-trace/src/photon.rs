@@ -5,7 +5,8 @@ use crate::ledger::EnergyLedger;
 /// Light that landed on a receiver after at least one specular event: `L S+ D`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
-    /// Where it landed, in metres.
+    /// Where it landed, in metres; for a photon at the edge of a sheet of light, the middle of what
+    /// its cell lights.
     pub position: Vec3,
     /// Unit direction in which it travelled.
     pub incoming: Vec3,

@@ -297,6 +297,7 @@ impl Level {
             let path = self.paths[index];
             let continued = self.photons_of(neighbour).any(|other| {
                 self.paths[other] == path
+                    && self.photons[other].object == photon.object
                     && lands_as_predicted(photon, &self.photons[other], axis, sign, detail)
             });
             if !continued {

@@ -7,9 +7,9 @@ use crate::emission::EmissionSample;
 use crate::ledger::Fate;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
-use crate::traced::Traced;
 use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
+use crate::traced::Traced;
 use crate::tracer::PathTracer;
 
 /// Photons that one task traces: enough to share out, few enough to balance.
@@ -130,7 +130,8 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         let parts: Vec<Traced> = (0..chunks).map(run).collect();
 
         let mut all = Traced::joined(parts);
-        if N == 2 && self.planned.points().sequence() == Sequence::Grid {
+        let checks = self.options.check_footprints && N == 2;
+        if checks && self.planned.points().sequence() == Sequence::Grid {
             all.check_footprints(self.planned.lattice());
         }
         map.photons.append(&mut all.photons);

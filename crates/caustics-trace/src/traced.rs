@@ -1,8 +1,6 @@
-use glam::Vec3;
-
 use crate::lattice::Lattice;
 use crate::ledger::EnergyLedger;
-use crate::neighbours::LatticePhotons;
+use crate::neighbours::{CheckedFootprint, LatticePhotons};
 use crate::photon::{FootprintSource, Photon};
 
 /// What some points of a light's lattice became.
@@ -49,7 +47,7 @@ impl Traced {
         };
         let count = self.starts.len() as u32 - 1;
         #[cfg(feature = "parallel")]
-        let checked: Vec<([Vec3; 2], FootprintSource)> = {
+        let checked: Vec<CheckedFootprint> = {
             use rayon::prelude::*;
             (0..count)
                 .into_par_iter()
@@ -58,14 +56,15 @@ impl Traced {
                 .collect()
         };
         #[cfg(not(feature = "parallel"))]
-        let checked: Vec<([Vec3; 2], FootprintSource)> = (0..count)
+        let checked: Vec<CheckedFootprint> = (0..count)
             .flat_map(|point| photons.checked(point))
             .collect();
-        for (photon, (axes, source)) in self.photons.iter_mut().zip(checked) {
-            photon.axes = axes;
-            photon.source = source;
+        for (photon, footprint) in self.photons.iter_mut().zip(checked) {
+            photon.position = footprint.position;
+            photon.axes = footprint.axes;
+            photon.source = footprint.source;
             self.ledger.replaced_differentials +=
-                u64::from(source == FootprintSource::Neighbour);
+                u64::from(footprint.source == FootprintSource::Neighbour);
         }
     }
 }

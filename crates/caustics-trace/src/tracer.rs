@@ -231,7 +231,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: branch.events,
             source: branch.source,
         });
-        self.paths.push(extended(branch.path, point.object, 0));
+        self.paths.push(branch.path);
     }
 
     fn branch_out(
