@@ -6,7 +6,10 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use caustics_accel::{BvhOptions, Instructions, Intersect, TriangleBvh};
+use caustics_accel::{
+    BvhOptions, Instructions, Intersect, KdTreeOptions, KdTreeTraversal, TriangleBvh,
+    TriangleKdTree,
+};
 use caustics_benches::{meshes, rays};
 use caustics_geometry::{Hit, Ray};
 
@@ -39,6 +42,14 @@ fn main() {
         };
         let portable =
             TriangleBvh::new(&mesh.positions, &mesh.triangles, &portable).expect("valid");
+        let start = Instant::now();
+        let kd = TriangleKdTree::new(&mesh.positions, &mesh.triangles, &KdTreeOptions::default())
+            .expect("valid");
+        println!(
+            "kd-tree built in {:.1} ms, {:.0} bytes a triangle",
+            start.elapsed().as_secs_f64() * 1e3,
+            kd.memory_bytes() as f64 / mesh.triangles.len() as f64
+        );
         let coherent = rays::coherent(&mesh, 9);
         let incoherent = rays::incoherent(&mesh, &bvh, &coherent);
         #[cfg(feature = "embree")]
@@ -68,6 +79,17 @@ fn main() {
                 ));
             }
             tracers.push(("ours", Box::new(|rays| count(rays, |r| bvh.closest_hit(r)))));
+            tracers.push((
+                "kd-tree",
+                Box::new(|rays| count(rays, |r| kd.closest_hit(r))),
+            ));
+            tracers.push((
+                "kd-tree restart",
+                Box::new(|rays| {
+                    let kd = kd.traversed_by(KdTreeTraversal::Restart);
+                    count(rays, |r| kd.closest_hit(r))
+                }),
+            ));
             tracers.push((
                 "ours portable",
                 Box::new(|rays| count(rays, |r| portable.closest_hit(r))),

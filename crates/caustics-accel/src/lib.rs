@@ -84,6 +84,8 @@ mod neighbour;
 mod photon_tree;
 mod simd;
 mod triangle_bvh;
+mod triangle_kd_tree;
+mod triangles;
 
 pub use box_tree::BoxTree;
 pub use error::AccelError;
@@ -94,3 +96,6 @@ pub use neighbour::{NearestScratch, Neighbour};
 pub use photon_tree::PhotonTree;
 pub use simd::Instructions;
 pub use triangle_bvh::{BvhOptions, BvhPreset, TriangleBvh};
+pub use triangle_kd_tree::{
+    KdTreeOptions, KdTreeSplit, KdTreeTraversal, TraversedKdTree, TriangleKdTree,
+};

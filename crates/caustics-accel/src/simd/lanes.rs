@@ -37,6 +37,15 @@ pub(crate) trait Lanes: Copy {
     fn bits(self, mask: Self::Mask) -> u32;
 }
 
+/// Removes and returns the lowest set bit's index.
+#[inline(always)]
+pub(crate) fn next_lane(bits: &mut u32) -> usize {
+    // The mask tells the compiler that the lane is in range.
+    let lane = bits.trailing_zeros() as usize & 7;
+    *bits &= *bits - 1;
+    lane
+}
+
 /// Plain arrays, which the compiler turns into whatever the target has (SSE2, NEON).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Portable;

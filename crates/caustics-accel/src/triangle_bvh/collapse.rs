@@ -1,8 +1,9 @@
 //! From a binary tree to one of eight children a node and eight triangles a leaf.
 
 use super::binary_tree::{BinaryNode, BinaryTree};
-use super::layout::{Block, Child, Node};
+use super::layout::{Child, Node};
 use crate::simd::WIDTH;
+use crate::triangles::Block;
 
 /// Cost of testing a node's eight boxes against a ray, in arbitrary units.
 const NODE_COST: f32 = 1.0;

@@ -1,7 +1,6 @@
 mod binary_tree;
 mod collapse;
 mod layout;
-mod leaf_test;
 mod refit;
 mod stream;
 mod traverse;
@@ -11,10 +10,11 @@ use caustics_geometry::{Aabb, Hit, Ray};
 
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
-use self::layout::{Block, Child, Node};
+use self::layout::{Child, Node};
 use self::stream::ClosestHits;
 use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
 use crate::simd::Dispatch;
+use crate::triangles::{self, Block, can_be_hit, validate};
 use crate::{AccelError, Instructions, Intersect};
 
 /// How much time to spend on building for the sake of tracing.
@@ -72,7 +72,7 @@ pub struct TriangleBvh {
 impl TriangleBvh {
     /// The largest magnitude of a vertex coordinate, in metres: products of three of them fit an
     /// f32.
-    pub const MAX_COORDINATE: f32 = 1e11;
+    pub const MAX_COORDINATE: f32 = triangles::MAX_COORDINATE;
 
     /// The most triangles that a tree takes.
     pub const MAX_TRIANGLES: usize = Child::MAX_BLOCK;
@@ -90,7 +90,7 @@ impl TriangleBvh {
         triangles: &[[u32; 3]],
         options: &BvhOptions,
     ) -> Result<Self, AccelError> {
-        validate(positions, triangles)?;
+        validate(positions, triangles, Self::MAX_TRIANGLES)?;
         let corners = |triangle: u32| {
             triangles[triangle as usize].map(|vertex| {
                 let position: Vec3 = positions[vertex as usize].into();
@@ -242,49 +242,4 @@ impl Intersect for TriangleBvh {
             ray,
         })
     }
-}
-
-/// A triangle that is a line along an axis or a point cannot be hit.
-fn can_be_hit(low: Vec3A, high: Vec3A) -> bool {
-    (high - low).cmpgt(Vec3A::ZERO).bitmask().count_ones() >= 2
-}
-
-fn validate<P: Copy + Into<Vec3>>(
-    positions: &[P],
-    triangles: &[[u32; 3]],
-) -> Result<(), AccelError> {
-    if triangles.len() > TriangleBvh::MAX_TRIANGLES {
-        return Err(AccelError::TooManyTriangles {
-            count: triangles.len(),
-            limit: TriangleBvh::MAX_TRIANGLES,
-        });
-    }
-    for (vertex, &position) in positions.iter().enumerate() {
-        let position: Vec3 = position.into();
-        if !position.is_finite() {
-            return Err(AccelError::NonFiniteVertex { vertex });
-        }
-        let coordinate = position.abs().max_element();
-        if coordinate > TriangleBvh::MAX_COORDINATE {
-            let limit = TriangleBvh::MAX_COORDINATE;
-            return Err(AccelError::VertexTooFar {
-                vertex,
-                coordinate,
-                limit,
-            });
-        }
-    }
-    for (triangle, corners) in triangles.iter().enumerate() {
-        for &vertex in corners {
-            if vertex as usize >= positions.len() {
-                let vertices = positions.len();
-                return Err(AccelError::VertexOutOfRange {
-                    triangle,
-                    vertex,
-                    vertices,
-                });
-            }
-        }
-    }
-    Ok(())
 }

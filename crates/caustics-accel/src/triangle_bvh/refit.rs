@@ -5,10 +5,11 @@ use caustics_geometry::glam::{Vec3, Vec3A};
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
-use super::layout::{Block, Child, Node};
-use super::{TriangleBvh, can_be_hit, validate};
+use super::TriangleBvh;
+use super::layout::{Child, Node};
 use crate::AccelError;
 use crate::simd::WIDTH;
+use crate::triangles::{Block, can_be_hit, validate};
 
 impl TriangleBvh {
     /// Moves the vertices of the triangles and keeps the tree's shape: several times faster than
@@ -26,7 +27,7 @@ impl TriangleBvh {
         positions: &[P],
         triangles: &[[u32; 3]],
     ) -> Result<f32, AccelError> {
-        validate(positions, triangles)?;
+        validate(positions, triangles, Self::MAX_TRIANGLES)?;
         if triangles.len() != self.triangles {
             let (given, expected) = (triangles.len(), self.triangles);
             return Err(AccelError::TriangleCountChanged { given, expected });

@@ -4,12 +4,9 @@ use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray};
 
 use super::layout::{Child, Node};
-use super::leaf_test::{Closest, ShearedRay};
-use super::traverse::{
-    STACK, Slabs, Tree, WIDEN, child_of, closest_hit, entry, is_usable, lower_end, near_of,
-    next_lane, search, splat,
-};
-use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH};
+use super::traverse::{STACK, Slabs, Tree, child_of, closest_hit, entry, near_of, search, splat};
+use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH, next_lane};
+use crate::triangles::{Closest, ShearedRay, WIDEN, is_usable, lower_end};
 
 /// Rows of rays in a bundle.
 const ROWS: usize = 2;

@@ -2,9 +2,9 @@
 
 use caustics_geometry::{Hit, Ray};
 
-use super::layout::{Block, Child, Node};
-use super::leaf_test::{Closest, ShearedRay};
-use crate::simd::{Kernel, Lanes, Row, Stack};
+use super::layout::{Child, Node};
+use crate::simd::{Kernel, Lanes, Row, Stack, next_lane};
+use crate::triangles::{Block, Closest, ShearedRay, WIDEN, is_usable, lower_end};
 
 /// What traversal reads.
 #[derive(Clone, Copy)]
@@ -50,15 +50,6 @@ pub(super) const STACK: usize = 512;
 /// Levels of nodes that the stack suffices for: each leaves at most seven children waiting, and
 /// the last one puts all eight on the stack for a moment.
 pub(super) const MAX_DEPTH: usize = (STACK - 1) / 7;
-
-/// Widens the far side of every box, so that no rounding lets a ray slip between two of them.
-///
-/// With e = 2^-24, a computed slab distance (b - o) * (1/d) is off by a factor of at most
-/// (1 + e)^3, the near and the far one together by 6 e. The leaf test sees the ray through
-/// vertices whose sheared x and y are off by a factor of at most (1 + e)^5, which shifts where it
-/// crosses the two slabs by another 10 e. 20 e covers both and the rounding of this product
-/// (after Ize, *Robust BVH Ray Traversal*, JCGT 2013, whose factor covers the slabs alone).
-pub(super) const WIDEN: f32 = 1.0 + 20.0 * (f32::EPSILON / 2.0);
 
 /// A ray for the test against boxes.
 pub(super) struct Slabs<F> {
@@ -131,29 +122,6 @@ pub(super) fn child_of(entry: u64) -> Child {
 #[inline(always)]
 pub(super) fn near_of(entry: u64) -> f32 {
     f32::from_bits((entry >> 32) as u32)
-}
-
-/// Removes and returns the lowest set bit's index.
-#[inline(always)]
-pub(super) fn next_lane(bits: &mut u32) -> usize {
-    // The mask tells the compiler that the lane is in range.
-    let lane = bits.trailing_zeros() as usize & 7;
-    *bits &= *bits - 1;
-    lane
-}
-
-/// Whether a ray can hit anything: it is finite and its range is not empty.
-#[inline(always)]
-pub(super) fn is_usable(ray: &Ray) -> bool {
-    // The comparison also turns away a NaN.
-    ray.origin.is_finite() && ray.direction.is_finite() && lower_end(ray) < ray.t_max
-}
-
-/// Lower end of the ray's range: boxes are entered at no negative parameter.
-#[inline(always)]
-pub(super) fn lower_end(ray: &Ray) -> f32 {
-    // A negative zero would sort above everything.
-    ray.t_min.max(0.0) + 0.0
 }
 
 /// Chooses the nearest of the children that are met, of which there is at least one; the others
