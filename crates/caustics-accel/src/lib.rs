@@ -78,6 +78,7 @@
 mod box_tree;
 mod error;
 mod hash_grid;
+mod instance_bvh;
 mod intersect;
 mod left_balanced_tree;
 mod neighbour;
@@ -90,6 +91,7 @@ mod triangles;
 pub use box_tree::BoxTree;
 pub use error::AccelError;
 pub use hash_grid::HashGrid;
+pub use instance_bvh::{BvhInstance, InstanceBvh};
 pub use intersect::Intersect;
 pub use left_balanced_tree::LeftBalancedTree;
 pub use neighbour::{NearestScratch, Neighbour};

@@ -1,9 +1,9 @@
 mod binary_tree;
 mod collapse;
-mod layout;
+pub(crate) mod layout;
 mod refit;
 mod stream;
-mod traverse;
+pub(crate) mod traverse;
 
 use caustics_geometry::glam::{Vec3, Vec3A};
 use caustics_geometry::{Aabb, Hit, Ray};
@@ -177,7 +177,7 @@ impl TriangleBvh {
         });
     }
 
-    fn tree(&self) -> Tree<'_> {
+    pub(crate) fn tree(&self) -> Tree<'_> {
         Tree {
             nodes: &self.nodes,
             blocks: &self.blocks,

@@ -4,7 +4,9 @@ use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray};
 
 use super::layout::{Child, Node};
-use super::traverse::{STACK, Slabs, Tree, child_of, closest_hit, entry, near_of, search, splat};
+use super::traverse::{
+    InPlace, STACK, Slabs, Tree, child_of, closest_hit, entry, near_of, search, splat,
+};
 use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH, next_lane};
 use crate::triangles::{Closest, ShearedRay, WIDEN, is_usable, lower_end};
 
@@ -108,8 +110,13 @@ fn trace<L: Lanes>(
                     let leaf = current.blocks();
                     sheared[lane].find_closest(lanes, tree.blocks, leaf, ray, closest);
                 } else {
-                    let slabs = rows[lane / WIDTH].slabs(lanes, hull.near_side, lane % WIDTH);
-                    search(lanes, tree, current, &slabs, &sheared[lane], ray, closest);
+                    let in_place = InPlace {
+                        slabs: rows[lane / WIDTH].slabs(lanes, hull.near_side, lane % WIDTH),
+                        sheared: &sheared[lane],
+                        blocks: tree.blocks,
+                        ray,
+                    };
+                    search(lanes, tree.nodes, current, &in_place, closest);
                 }
                 if closest.limit < before {
                     rows[lane / WIDTH].limit[lane % WIDTH] = closest.limit * WIDEN;

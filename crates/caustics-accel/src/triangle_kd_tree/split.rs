@@ -7,7 +7,7 @@ use crate::simd::WIDTH;
 /// Cost of a step past one node, in arbitrary units.
 const NODE_COST: f32 = 1.0;
 /// Cost of testing a block of eight triangles, in the same units.
-const BLOCK_COST: f32 = 6.0;
+const BLOCK_COST: f32 = 2.0;
 /// What a split's cost is multiplied by that cuts off empty space.
 const EMPTY_BONUS: f32 = 0.85;
 

@@ -28,6 +28,8 @@ pub(crate) struct Closest {
     /// lower index wins, whichever is found first.
     pub(crate) limit: f32,
     pub(crate) hit: Option<Hit>,
+    /// Added to the triangles' numbers in the blocks.
+    pub(crate) first: u32,
 }
 
 impl Closest {
@@ -37,11 +39,16 @@ impl Closest {
         Self {
             limit: ray.t_max.next_down(),
             hit: None,
+            first: 0,
         }
     }
 
     #[inline(always)]
     fn offer(&mut self, hit: Hit) {
+        let hit = Hit {
+            primitive: hit.primitive + self.first,
+            ..hit
+        };
         let nearer = self.hit.is_none_or(|than| {
             hit.t < than.t || (hit.t == than.t && hit.primitive < than.primitive)
         });
