@@ -103,8 +103,8 @@ impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Grower<'_, C> {
         self.cells.nodes[place] = Node::inner(plane.axis, plane.position, first);
         if is_large {
             let (lower, upper) = self.grow_both(lower, upper);
-            self.graft(lower, first);
-            self.graft(upper, first + 1);
+            self.graft(&lower, first);
+            self.graft(&upper, first + 1);
         } else {
             self.grow(lower, first);
             self.grow(upper, first + 1);
@@ -134,7 +134,7 @@ impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Grower<'_, C> {
     }
 
     /// Adds a tree of its own, its root at a given place.
-    fn graft(&mut self, tree: Cells, place: usize) {
+    fn graft(&mut self, tree: &Cells, place: usize) {
         // The root leaves its place, and the others move up.
         let nodes = self.cells.nodes.len() - 1;
         let blocks = self.cells.blocks.len();

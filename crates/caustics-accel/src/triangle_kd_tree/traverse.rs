@@ -208,10 +208,10 @@ fn walk<L: Lanes, S: Search, const N: usize>(lanes: L, tree: Tree<'_>, ray: &Ray
             let first = node.lower() + negative[axis];
             let second = node.lower() + 1 - negative[axis];
             let bit = 1_u64 << (63 - level);
-            let meets_first = !(latest < near);
-            let meets_second = !(earliest > far);
+            let misses_first = latest < near;
+            let misses_second = earliest > far;
             let second_near = if earliest > near { earliest } else { near };
-            if meets_first & meets_second & (trail & bit == 0) {
+            if !misses_first & !misses_second & (trail & bit == 0) {
                 stack.push(Entry {
                     node: second as u32,
                     near: second_near,
@@ -221,7 +221,7 @@ fn walk<L: Lanes, S: Search, const N: usize>(lanes: L, tree: Tree<'_>, ray: &Ray
                 node = tree.nodes[first];
             } else {
                 trail |= bit;
-                if meets_second {
+                if !misses_second {
                     near = second_near;
                     node = tree.nodes[second];
                 } else {
