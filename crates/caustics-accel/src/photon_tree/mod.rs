@@ -1,8 +1,8 @@
 mod search;
 
-use caustics_geometry::glam::Vec3;
+use caustics_geometry::glam::{Vec3, Vec3A};
 
-use self::search::{Nearest, Search, Within, keep_nearest};
+use self::search::{Nearest, NearestWhere, Search, Within};
 use crate::simd::{Dispatch, Row, WIDTH};
 use crate::{AccelError, Instructions, NearestScratch, Neighbour};
 
@@ -37,13 +37,14 @@ pub struct PhotonTree {
 struct Bucket {
     /// By axis, then by half of the bucket. Unused places are NaN, at no distance.
     positions: [[Row; 2]; 3],
-    indices: [u32; BUCKET],
+    /// By half of the bucket.
+    indices: [[u32; WIDTH]; 2],
 }
 
 impl Bucket {
     const EMPTY: Self = Self {
         positions: [[[f32::NAN; WIDTH]; 2]; 3],
-        indices: [u32::MAX; BUCKET],
+        indices: [[u32::MAX; WIDTH]; 2],
     };
 }
 
@@ -177,7 +178,18 @@ impl PhotonTree {
         max_radius: f32,
         scratch: &'scratch mut NearestScratch,
     ) -> &'scratch [Neighbour] {
-        self.nearest_where(point, count, max_radius, |_| true, scratch)
+        let mut found = 0;
+        if count > 0 {
+            let keys = &mut scratch.keys;
+            let nearest = Nearest::new(keys, &mut found, count.min(self.points));
+            self.dispatch.run(Search {
+                tree: self,
+                point: point.into(),
+                radius: max_radius,
+                collector: nearest,
+            });
+        }
+        scratch.finish(found)
     }
 
     /// Like [`nearest`](Self::nearest), among the points whose index `accept` approves of.
@@ -191,22 +203,18 @@ impl PhotonTree {
         accept: impl FnMut(u32) -> bool,
         scratch: &'scratch mut NearestScratch,
     ) -> &'scratch [Neighbour] {
-        scratch.keys.clear();
+        let mut found = 0;
         if count > 0 {
+            let keys = &mut scratch.keys;
+            let nearest = Nearest::new(keys, &mut found, count.min(self.points));
             self.dispatch.run(Search {
                 tree: self,
                 point: point.into(),
                 radius: max_radius,
-                collector: Nearest {
-                    keys: &mut scratch.keys,
-                    count,
-                    capacity: count,
-                    accept,
-                },
+                collector: NearestWhere { nearest, accept },
             });
-            keep_nearest(&mut scratch.keys, count);
         }
-        scratch.finish()
+        scratch.finish(found)
     }
 
     /// Calls `visit` with the index and the squared distance of every point no farther than
@@ -216,7 +224,7 @@ impl PhotonTree {
             tree: self,
             point: point.into(),
             radius,
-            collector: Within { visit },
+            collector: Within::new(visit),
         });
     }
 
@@ -230,7 +238,7 @@ impl PhotonTree {
         for index in self
             .buckets
             .iter_mut()
-            .flat_map(|bucket| &mut bucket.indices)
+            .flat_map(|bucket| bucket.indices.as_flattened_mut())
         {
             if *index != u32::MAX {
                 former.push(std::mem::replace(index, former.len() as u32));
@@ -245,7 +253,7 @@ impl PhotonTree {
         let fresh = self
             .buckets
             .iter()
-            .flat_map(|bucket| bucket.indices)
+            .flat_map(|bucket| bucket.indices.into_iter().flatten())
             .all(|index| {
                 index == u32::MAX
                     || seen
@@ -260,7 +268,7 @@ impl PhotonTree {
                     bucket.positions[axis as usize]
                         .into_iter()
                         .flatten()
-                        .zip(bucket.indices)
+                        .zip(bucket.indices.into_iter().flatten())
                         .filter_map(|(x, index)| (index != u32::MAX).then_some(x))
                 })
         };
@@ -292,7 +300,7 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
             for axis in 0..3 {
                 bucket.positions[axis][place / WIDTH][place % WIDTH] = point.position[axis];
             }
-            bucket.indices[place] = point.index;
+            bucket.indices[place / WIDTH][place % WIDTH] = point.index;
         }
         return;
     }
@@ -305,7 +313,8 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
     let (left, first_right, _) = points.select_nth_unstable_by(left_count * BUCKET, compare);
     let mut largest = f32::NEG_INFINITY;
     for point in left {
-        largest = largest.max(point.position[axis]);
+        let x = point.position[axis];
+        largest = if x > largest { x } else { largest };
     }
     *split = Split {
         axis: axis as u32,
@@ -328,15 +337,22 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
 }
 
 fn widest_axis(points: &[Point]) -> usize {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point.position[axis]);
-            high[axis] = high[axis].max(point.position[axis]);
+    // Two of each, so that one need not wait for the other.
+    let mut low = [Vec3A::INFINITY; 2];
+    let mut high = [Vec3A::NEG_INFINITY; 2];
+    let mut pairs = points.chunks_exact(2);
+    for pair in &mut pairs {
+        for side in 0..2 {
+            let position = Vec3A::from_array(pair[side].position);
+            low[side] = low[side].min(position);
+            high[side] = high[side].max(position);
         }
     }
-    let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+    for point in pairs.remainder() {
+        low[0] = low[0].min(Vec3A::from_array(point.position));
+        high[0] = high[0].max(Vec3A::from_array(point.position));
+    }
+    let extent = (high[0].max(high[1]) - low[0].min(low[1])).to_array();
     let widest = usize::from(extent[1] > extent[0]);
     if extent[2] > extent[widest] {
         2
