@@ -49,7 +49,7 @@ pub struct BvhInstance {
 ///     transform: Affine3A::from_translation(Vec3::X * x),
 /// };
 /// let mut tiles = InstanceBvh::new(vec![at(0.0), at(2.0)], Instructions::Detect)?;
-/// let ray = Ray::new([2.5, 1.0, 0.5], Vec3::NEG_Y);
+/// let ray = Ray::new([1.5, 1.0, 0.5], Vec3::NEG_Y);
 /// let hit = tiles.closest_hit(&ray).expect("the second tile");
 /// assert_eq!((hit.primitive, tiles.locate(hit.primitive)), (3, Some((1, 1))));
 /// // It moves away.

@@ -53,6 +53,17 @@ impl Child {
         Self(Self::LEAF | ((first_block as u32) << Self::COUNT_BITS) | blocks as u32)
     }
 
+    /// The same child where nodes and blocks have moved to later places.
+    pub(crate) fn shifted(self, nodes: usize, blocks: usize) -> Self {
+        if self == Self::EMPTY {
+            self
+        } else if self.is_leaf() {
+            Self(self.0 + ((blocks as u32) << Self::COUNT_BITS))
+        } else {
+            Self(self.0 + nodes as u32)
+        }
+    }
+
     #[inline(always)]
     pub(crate) fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
@@ -92,5 +103,8 @@ mod tests {
             assert_eq!(leaf.blocks(), first..first + blocks);
         }
         assert!(Child::EMPTY.blocks().is_empty());
+        assert_eq!(Child::node(7).shifted(3, 5), Child::node(10));
+        assert_eq!(Child::leaf(7, 2).shifted(3, 5), Child::leaf(12, 2));
+        assert_eq!(Child::EMPTY.shifted(3, 5), Child::EMPTY);
     }
 }

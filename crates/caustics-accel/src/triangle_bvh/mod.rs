@@ -7,6 +7,8 @@ pub(crate) mod traverse;
 
 use caustics_geometry::glam::{Vec3, Vec3A};
 use caustics_geometry::{Aabb, Hit, Ray};
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
 
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
@@ -14,7 +16,7 @@ use self::layout::{Child, Node};
 use self::stream::ClosestHits;
 use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
 use crate::simd::Dispatch;
-use crate::triangles::{self, Block, can_be_hit, validate};
+use crate::triangles::{self, Block, can_be_hit, corners_of, validate};
 use crate::{AccelError, Instructions, Intersect};
 
 /// How much time to spend on building for the sake of tracing.
@@ -85,32 +87,35 @@ impl TriangleBvh {
     /// # Errors
     /// [`AccelError::NonFiniteVertex`], [`AccelError::VertexTooFar`],
     /// [`AccelError::VertexOutOfRange`] or [`AccelError::TooManyTriangles`].
-    pub fn new<P: Copy + Into<Vec3>>(
+    pub fn new<P: Copy + Into<Vec3> + Sync>(
         positions: &[P],
         triangles: &[[u32; 3]],
         options: &BvhOptions,
     ) -> Result<Self, AccelError> {
         validate(positions, triangles, Self::MAX_TRIANGLES)?;
-        let corners = |triangle: u32| {
-            triangles[triangle as usize].map(|vertex| {
-                let position: Vec3 = positions[vertex as usize].into();
-                position.to_array()
-            })
+        let corners = |triangle: u32| corners_of(positions, triangles, triangle);
+        let bounds_of = |triangle: u32| {
+            let [a, b, c] = corners(triangle).map(Vec3A::from);
+            TriangleBounds {
+                low: a.min(b).min(c),
+                high: a.max(b).max(c),
+                triangle,
+            }
         };
-        let boxes: Vec<TriangleBounds> = (0..triangles.len() as u32)
-            .filter_map(|triangle| {
-                let [a, b, c] = corners(triangle).map(Vec3A::from);
-                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-                can_be_hit(low, high).then_some(TriangleBounds {
-                    low,
-                    high,
-                    triangle,
-                })
-            })
+        let all = 0..triangles.len() as u32;
+        #[cfg(feature = "parallel")]
+        let mut boxes: Vec<TriangleBounds> = all
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(bounds_of)
             .collect();
-        let mut wide = collapse(&BinaryTree::clustered(&boxes, options.preset), corners);
+        #[cfg(not(feature = "parallel"))]
+        let mut boxes: Vec<TriangleBounds> = all.map(bounds_of).collect();
+        boxes.retain(|bounds| can_be_hit(bounds.low, bounds.high));
+        let mut binary = BinaryTree::clustered(&boxes, options.preset);
+        let mut wide = collapse(&mut binary.nodes, &corners);
         if wide.depth > MAX_DEPTH {
-            wide = collapse(&BinaryTree::halved(&boxes), corners);
+            wide = collapse(&mut BinaryTree::halved(&boxes).nodes, &corners);
         }
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, bounds| {
             all.extend(Vec3::from(bounds.low))
