@@ -342,6 +342,10 @@ fn refitted_trees_find_what_new_ones_find() {
         .collect();
     let worse = tree.refit(&twisted, &triangles).unwrap();
     assert!(worse > 1.05 && worse < 5.0, "{worse}");
+    assert_eq!(
+        (tree.cost_ratio(), tree.needs_rebuild()),
+        (worse, worse > 1.5)
+    );
     let fresh = TriangleBvh::new(&twisted, &triangles, &options).unwrap();
     assert_eq!(tree.bounds(), fresh.bounds());
     let mut found = 0;
@@ -353,6 +357,18 @@ fn refitted_trees_find_what_new_ones_find() {
         found += u32::from(fresh.is_occluded(&ray));
     }
     assert!(found > 2000);
+    // Wrung out until neighbours in the tree are far from each other.
+    let wrung: Vec<Vec3> = positions
+        .iter()
+        .map(|p| {
+            let (sin, cos) = (12.0 * p.y).sin_cos();
+            Vec3::new(cos * p.x - sin * p.z, p.y, sin * p.x + cos * p.z)
+        })
+        .collect();
+    tree.refit(&wrung, &triangles).unwrap();
+    assert!(tree.needs_rebuild());
+    tree = TriangleBvh::new(&wrung, &triangles, &options).unwrap();
+    assert!(tree.cost_ratio() == 1.0 && !tree.needs_rebuild());
 }
 
 #[test]

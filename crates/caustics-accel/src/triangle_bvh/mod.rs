@@ -66,7 +66,8 @@ pub struct TriangleBvh {
     triangles: usize,
     /// Those that can be hit.
     stored: usize,
-    /// What a ray may expect to pay, when the tree was built.
+    /// What a ray may expect to pay now, and when the tree was built.
+    cost: f32,
     fresh_cost: f32,
     dispatch: Dispatch,
 }
@@ -75,6 +76,10 @@ impl TriangleBvh {
     /// The largest magnitude of a vertex coordinate, in metres: products of three of them fit an
     /// f32.
     pub const MAX_COORDINATE: f32 = triangles::MAX_COORDINATE;
+
+    /// The [`cost_ratio`](Self::cost_ratio) above which a refitted tree had better be built anew:
+    /// rays then take about a quarter longer.
+    pub const REBUILD_RATIO: f32 = 1.5;
 
     /// The most triangles that a tree takes.
     pub const MAX_TRIANGLES: usize = Child::MAX_BLOCK;
@@ -134,10 +139,12 @@ impl TriangleBvh {
             bounds,
             triangles: triangles.len(),
             stored: boxes.len(),
+            cost: 0.0,
             fresh_cost: 0.0,
             dispatch: Dispatch::new(options.instructions),
         };
         tree.fresh_cost = tree.expected_cost();
+        tree.cost = tree.fresh_cost;
         debug_assert!(tree.is_valid());
         Ok(tree)
     }
