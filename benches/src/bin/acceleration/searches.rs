@@ -113,6 +113,19 @@ impl Field<'_> {
                 }),
             ));
             searchers.push((
+                "**PhotonTree, in order**",
+                Box::new(move |queries| {
+                    let mut scratch = NearestScratch::new();
+                    let mut total = 0.0;
+                    self.ours
+                        .nearest_of_each(queries, count, radius, &mut scratch, |_, found| {
+                            let payload = &self.ours_payload;
+                            total += found.iter().map(|n| sum(payload, n.index)).sum::<f64>();
+                        });
+                    total
+                }),
+            ));
+            searchers.push((
                 "**LeftBalancedTree**",
                 Box::new(move |queries| {
                     let mut scratch = NearestScratch::new();
@@ -373,7 +386,12 @@ fn table(columns: &[Column], queries: usize) -> String {
     let mut header = vec!["1 / 2 threads".to_owned()];
     header.extend(columns.iter().map(|column| column.title.clone()));
     let mut table = Table::new(&header);
-    let names: Vec<&str> = columns[0].times[0].iter().map(|(name, _)| *name).collect();
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in columns.iter().flat_map(|column| &column.times[0]) {
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
     for name in names {
         let mut cells = vec![name.to_owned()];
         for (place, column) in columns.iter().enumerate() {
