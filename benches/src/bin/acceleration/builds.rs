@@ -77,32 +77,32 @@ fn builders(mesh: &Mesh, #[allow(unused)] threads: usize) -> Vec<Contestant<'_>>
     ]
 }
 
-fn refitters(mesh: &Mesh) -> Vec<Contestant<'_>> {
-    let shapes = [mesh.clone(), bent(mesh)];
-    let mut ours = bvh_of(mesh, BvhPreset::Balanced);
-    let mut as_built = Obvhs::new(mesh);
-    let mut ordered = Obvhs::new(mesh);
+/// Refits to two shapes in turns.
+fn refitter<'a, T: 'a>(
+    name: &'static str,
+    mut tree: T,
+    shapes: &'a [Mesh; 2],
+    refit: impl Fn(&mut T, &Mesh) + 'a,
+) -> Contestant<'a> {
+    let mut turn = 0;
+    Contestant::new(name, move || {
+        turn += 1;
+        refit(&mut tree, &shapes[turn % 2]);
+        0
+    })
+}
+
+fn refitters(shapes: &[Mesh; 2]) -> Vec<Contestant<'_>> {
+    let as_built = Obvhs::new(&shapes[0]);
+    let mut ordered = Obvhs::new(&shapes[0]);
     ordered.order_nodes();
-    let (a, b, c) = (shapes.clone(), shapes.clone(), shapes);
-    let mut turn = [0_usize; 3];
-    let [turn_a, turn_b, turn_c] = &mut turn;
-    let (mut turn_a, mut turn_b, mut turn_c) = (*turn_a, *turn_b, *turn_c);
+    let ours = bvh_of(&shapes[0], BvhPreset::Balanced);
     vec![
-        Contestant::new("obvhs, refitted", move || {
-            turn_a += 1;
-            as_built.refit(&a[turn_a % 2]);
-            0
-        }),
-        Contestant::new("obvhs, ordered and refitted", move || {
-            turn_b += 1;
-            ordered.refit(&b[turn_b % 2]);
-            0
-        }),
-        Contestant::new("**TriangleBvh, refitted**", move || {
-            turn_c += 1;
-            let shape = &c[turn_c % 2];
-            let ratio = ours.refit(&shape.positions, &shape.triangles);
-            u64::from(ratio.expect("the same triangles") < 2.0)
+        refitter("obvhs, refitted", as_built, shapes, Obvhs::refit),
+        refitter("obvhs, ordered and refitted", ordered, shapes, Obvhs::refit),
+        refitter("**TriangleBvh, refitted**", ours, shapes, |tree, shape| {
+            let refitted = tree.refit(&shape.positions, &shape.triangles);
+            refitted.expect("the same triangles");
         }),
     ]
 }
@@ -116,12 +116,13 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String
     // By mesh, then by number of threads.
     let mut times: Vec<Vec<Vec<Time>>> = Vec::new();
     for mesh in &meshes {
+        let shapes = [mesh.clone(), bent(mesh)];
         let mut of_mesh = Vec::new();
         for &threads in threads {
             // Inside the pool, so that the libraries that use rayon find it.
             let found = pool(threads)?.install(|| {
-                let mut found = medians_of(builders(mesh, threads), arguments);
-                found.extend(medians_of(refitters(mesh), arguments));
+                let mut found = medians(builders(mesh, threads), arguments.patience());
+                found.extend(medians(refitters(&shapes), arguments.patience()));
                 found
             });
             of_mesh.push(found);
@@ -141,9 +142,4 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String
         table.row(&cells);
     }
     Ok(vec![("builds", table.finish())])
-}
-
-// Contestants are not `Send`, so that they are made where they run.
-fn medians_of(contestants: Vec<Contestant<'_>>, arguments: &Arguments) -> Vec<Time> {
-    medians(contestants, arguments.patience())
 }

@@ -1,6 +1,5 @@
 //! Many instances of a mesh against all of them flattened into one.
 
-use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -9,6 +8,7 @@ use caustics_benches::meshes::{self, Mesh};
 use caustics_benches::random::Random;
 use caustics_benches::rays;
 use caustics_benches::stage::Failure;
+use caustics_geometry::Ray;
 use glam::{Affine3A, Quat, Vec3};
 
 use crate::arguments::Arguments;
@@ -30,6 +30,12 @@ fn places(side: u32) -> Vec<Affine3A> {
             Affine3A::from_rotation_translation(turn, at)
         })
         .collect()
+}
+
+fn hits(tree: &impl Intersect, rays: &[Ray]) -> u64 {
+    rays.iter()
+        .filter(|ray| tree.closest_hit(ray).is_some())
+        .count() as u64
 }
 
 pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Failure> {
@@ -95,23 +101,10 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String
             {
                 return Err(format!("instances differ from the flattened mesh at {ray:?}").into());
             }
-            let count = |tree: &dyn Fn() -> u64| black_box(tree());
             let times = medians(
                 vec![
-                    Contestant::new("flattened", || {
-                        count(&|| {
-                            rays.iter()
-                                .filter(|r| whole.closest_hit(r).is_some())
-                                .count() as u64
-                        })
-                    }),
-                    Contestant::new("instances", || {
-                        count(&|| {
-                            rays.iter()
-                                .filter(|r| ours.closest_hit(r).is_some())
-                                .count() as u64
-                        })
-                    }),
+                    Contestant::new("flattened", || hits(&whole, rays)),
+                    Contestant::new("instances", || hits(&ours, rays)),
                 ],
                 arguments.patience(),
             );

@@ -187,7 +187,7 @@ impl Field<'_> {
                 let mut total = 0.0;
                 for &q in queries {
                     self.ours.within(q, radius, |index, _| {
-                        total += sum(&self.ours_payload, index)
+                        total += sum(&self.ours_payload, index);
                     });
                 }
                 total

@@ -22,8 +22,11 @@ const CHUNK: usize = 4096;
 
 const KINDS: [&str; 2] = ["coherent", "incoherent"];
 
-/// A way to trace rays, which returns the number of hits.
-type Tracer<'a> = (&'static str, Box<dyn Fn(&[Ray]) -> u64 + Sync + 'a>);
+/// Traces rays and returns the number of hits.
+type Trace<'a> = Box<dyn Fn(&[Ray]) -> u64 + Sync + 'a>;
+
+/// A way to trace rays, by name.
+type Tracer<'a> = (&'static str, Trace<'a>);
 
 /// Everything that traces one mesh.
 struct Field {
@@ -185,7 +188,7 @@ impl Field {
 }
 
 /// One ray after the other.
-fn each<'a>(is_hit: impl Fn(&Ray) -> bool + Sync + 'a) -> Box<dyn Fn(&[Ray]) -> u64 + Sync + 'a> {
+fn each<'a>(is_hit: impl Fn(&Ray) -> bool + Sync + 'a) -> Trace<'a> {
     Box::new(move |rays| rays.iter().filter(|ray| is_hit(ray)).count() as u64)
 }
 
@@ -195,9 +198,7 @@ thread_local! {
 }
 
 /// Many rays at once.
-fn all<'a>(
-    trace: impl Fn(&[Ray], &mut [Option<Hit>]) + Sync + 'a,
-) -> Box<dyn Fn(&[Ray]) -> u64 + Sync + 'a> {
+fn all<'a>(trace: impl Fn(&[Ray], &mut [Option<Hit>]) + Sync + 'a) -> Trace<'a> {
     Box::new(move |rays| {
         HITS.with_borrow_mut(|hits| {
             hits.resize(rays.len(), None);
@@ -276,8 +277,7 @@ fn table(meshes: &[Mesh], times: &Times) -> String {
     }
     let mut table = Table::new(&header);
     let seconds = |mesh: usize, kind: usize, row: usize| times[mesh][kind][row].1;
-    for row in 0..times[0][0].len() {
-        let name = times[0][0][row].0;
+    for (row, &(name, _)) in times[0][0].iter().enumerate() {
         if row == 0 {
             let mut cells = vec![format!("{name}, Mrays/s")];
             for kind in 0..KINDS.len() {
