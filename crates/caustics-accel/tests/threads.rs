@@ -24,7 +24,7 @@ fn assert_same<T: std::fmt::Debug>(make: impl Fn() -> T + Send + Sync) {
 #[test]
 fn trees_over_triangles_do_not_depend_on_threads() {
     // Large enough to be divided more than once.
-    let (positions, triangles) = icosphere(6, Vec3::ZERO);
+    let (positions, triangles) = icosphere(5, Vec3::ZERO);
     for preset in [
         BvhPreset::FastestBuild,
         BvhPreset::FastBuild,

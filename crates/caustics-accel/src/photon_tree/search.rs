@@ -36,7 +36,7 @@ pub(super) trait Collector {
 }
 
 /// How many points wait to be visited: a loop over many is foreseen better than many over few.
-const WAITING: usize = 32 * WIDTH;
+const WAITING: usize = 16 * WIDTH;
 
 /// Visits all points.
 pub(super) struct Within<V> {

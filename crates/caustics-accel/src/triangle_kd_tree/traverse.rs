@@ -273,7 +273,7 @@ fn part_within(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> Option<(f32, f3
             (low, high)
         };
         // A NaN, from 0 * inf, is passed over.
-        let leave = leave * WIDEN;
+        let (enter, leave) = (enter * EARLIER, leave * WIDEN);
         near = if enter > near { enter } else { near };
         far = if leave < far { leave } else { far };
     }
