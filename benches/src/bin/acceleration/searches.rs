@@ -184,13 +184,12 @@ impl Field<'_> {
         searchers.push((
             "**PhotonTree**",
             Box::new(move |queries| {
-                let mut total = 0.0;
-                for &q in queries {
-                    self.ours.within(q, radius, |index, _| {
-                        total += sum(&self.ours_payload, index);
-                    });
-                }
-                total
+                let total = queries.iter().map(|&q| {
+                    self.ours.fold_within(q, radius, 0.0, |total, index, _| {
+                        total + sum(&self.ours_payload, index)
+                    })
+                });
+                total.sum()
             }),
         ));
         searchers.push((

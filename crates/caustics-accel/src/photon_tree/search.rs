@@ -20,6 +20,9 @@ struct Waiting {
 
 /// What becomes of the points that a search comes across.
 pub(super) trait Collector {
+    /// What is made of them.
+    type Output;
+
     /// Takes the lanes that are no farther than the bound, at least one; returns the squared
     /// distance that counts from then on, given the one that counted before.
     fn take<L: Lanes>(
@@ -32,31 +35,36 @@ pub(super) trait Collector {
     ) -> f32;
 
     /// There are no more.
-    fn finish(&mut self);
+    fn finish(self) -> Self::Output;
 }
 
 /// How many points wait to be visited: a loop over many is foreseen better than many over few.
 const WAITING: usize = 16 * WIDTH;
 
-/// Visits all points.
-pub(super) struct Within<V> {
-    visit: V,
+/// Folds all points into a value.
+pub(super) struct Fold<T, F> {
+    /// There but while it is being added to.
+    value: Option<T>,
+    add: F,
     keys: [u64; WAITING],
     waiting: usize,
 }
 
-impl<V: FnMut(u32, f32)> Within<V> {
+impl<T, F: FnMut(T, u32, f32) -> T> Fold<T, F> {
     #[inline(always)]
-    pub(super) fn new(visit: V) -> Self {
+    pub(super) fn new(value: T, add: F) -> Self {
         Self {
-            visit,
+            value: Some(value),
+            add,
             keys: [0; WAITING],
             waiting: 0,
         }
     }
 }
 
-impl<V: FnMut(u32, f32)> Collector for Within<V> {
+impl<T, F: FnMut(T, u32, f32) -> T> Collector for Fold<T, F> {
+    type Output = Option<T>;
+
     #[inline(always)]
     fn take<L: Lanes>(
         &mut self,
@@ -67,7 +75,7 @@ impl<V: FnMut(u32, f32)> Collector for Within<V> {
         bound: f32,
     ) -> f32 {
         if self.waiting > WAITING - WIDTH {
-            self.finish();
+            self.add_waiting();
         }
         append(
             lanes,
@@ -81,9 +89,20 @@ impl<V: FnMut(u32, f32)> Collector for Within<V> {
     }
 
     #[inline(always)]
-    fn finish(&mut self) {
-        for &key in &self.keys[..self.waiting] {
-            (self.visit)(index_of(key), distance_squared_of(key));
+    fn finish(mut self) -> Option<T> {
+        self.add_waiting();
+        self.value
+    }
+}
+
+impl<T, F: FnMut(T, u32, f32) -> T> Fold<T, F> {
+    #[inline(always)]
+    fn add_waiting(&mut self) {
+        if let Some(mut value) = self.value.take() {
+            for &key in &self.keys[..self.waiting] {
+                value = (self.add)(value, index_of(key), distance_squared_of(key));
+            }
+            self.value = Some(value);
         }
         self.waiting = 0;
     }
@@ -142,6 +161,8 @@ impl<'a> Nearest<'a> {
 }
 
 impl Collector for Nearest<'_> {
+    type Output = ();
+
     #[inline(always)]
     fn take<L: Lanes>(
         &mut self,
@@ -156,7 +177,7 @@ impl Collector for Nearest<'_> {
     }
 
     #[inline(always)]
-    fn finish(&mut self) {
+    fn finish(self) {
         keep_nearest(self.keys, self.found, self.count);
     }
 }
@@ -168,6 +189,8 @@ pub(super) struct NearestWhere<'a, A> {
 }
 
 impl<A: FnMut(u32) -> bool> Collector for NearestWhere<'_, A> {
+    type Output = ();
+
     #[inline(always)]
     fn take<L: Lanes>(
         &mut self,
@@ -187,7 +210,7 @@ impl<A: FnMut(u32) -> bool> Collector for NearestWhere<'_, A> {
     }
 
     #[inline(always)]
-    fn finish(&mut self) {
+    fn finish(self) {
         self.nearest.finish();
     }
 }
@@ -213,10 +236,10 @@ pub(super) struct Search<'a, C> {
 }
 
 impl<C: Collector> Kernel for Search<'_, C> {
-    type Output = ();
+    type Output = C::Output;
 
     #[inline(always)]
-    fn run<L: Lanes>(mut self, lanes: L) {
+    fn run<L: Lanes>(mut self, lanes: L) -> C::Output {
         let query = self.point.extend(0.0).to_array();
         let rows = [
             lanes.splat(query[0]),
@@ -228,7 +251,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
         let mut stack = Stack::<Waiting, STACK>::new();
         let buckets = self.tree.buckets.len() as u32;
         if buckets == 0 {
-            return;
+            return self.collector.finish();
         }
         stack.push(Waiting {
             subtree: Subtree {
@@ -292,6 +315,6 @@ impl<C: Collector> Kernel for Search<'_, C> {
                 }
             }
         }
-        self.collector.finish();
+        self.collector.finish()
     }
 }
