@@ -1,7 +1,7 @@
 //! The little of Embree 3 that a comparison needs; links to the system's `libembree3`.
 #![allow(unsafe_code)]
 
-use std::ffi::c_void;
+use std::ffi::{CString, c_void};
 use std::ptr::{null, null_mut};
 
 use caustics_geometry::{Hit, Ray};
@@ -88,6 +88,10 @@ unsafe extern "C" {
     );
 }
 
+// SAFETY: a committed scene may be traced by several threads at a time, says Embree's manual, and
+// nothing changes one after `new`.
+unsafe impl Sync for Embree {}
+
 /// How Embree builds and traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
@@ -99,23 +103,30 @@ pub enum Mode {
     HighQuality,
 }
 
-/// A scene of one mesh, built and traced on one thread.
+/// A scene of one mesh.
 pub struct Embree {
     device: *mut c_void,
     scene: *mut c_void,
 }
 
 impl Embree {
-    /// Builds the scene.
+    /// Builds the scene on one thread.
     #[must_use]
+    pub fn new(mesh: &Mesh, mode: Mode) -> Self {
+        Self::with_threads(mesh, mode, 1)
+    }
+
+    /// Builds the scene on some threads.
     ///
     /// # Panics
     /// If Embree makes no device.
-    pub fn new(mesh: &Mesh, mode: Mode) -> Self {
+    #[must_use]
+    pub fn with_threads(mesh: &Mesh, mode: Mode, threads: usize) -> Self {
+        let config = CString::new(format!("threads={threads},isa=avx2")).expect("no zero in it");
         // SAFETY: handles go only where Embree's API wants them; the buffers have the size asked
         // for, plus the padding that Embree adds itself.
         unsafe {
-            let device = rtcNewDevice(c"threads=1,isa=avx2".as_ptr().cast());
+            let device = rtcNewDevice(config.as_ptr().cast());
             assert!(!device.is_null(), "no Embree device");
             let scene = rtcNewScene(device);
             if mode == Mode::Robust {

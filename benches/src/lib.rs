@@ -1,5 +1,7 @@
 //! What the benchmarks of this workspace have in common: meshes, rays, photons and peers.
 
+pub mod conditions;
+pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod meshes;

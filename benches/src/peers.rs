@@ -23,16 +23,22 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [Vec3; 3]> + '_ {
         .map(|t| t.map(|vertex| mesh.positions[vertex as usize]))
 }
 
-/// obvhs used bare: its binary tree of the preset `fast` over its own precomputed triangles.
+/// obvhs used bare: its binary tree over its own precomputed triangles.
 pub struct Obvhs {
     tree: Bvh2,
     triangles: Vec<RtTriangle>,
 }
 
 impl Obvhs {
-    /// Builds the tree.
+    /// Builds the tree of the preset `fast`.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
+        Self::with_parameters(mesh, BvhBuildParams::fast_build())
+    }
+
+    /// Builds the tree of some preset.
+    #[must_use]
+    pub fn with_parameters(mesh: &Mesh, parameters: BvhBuildParams) -> Self {
         let triangles: Vec<_> = corners(mesh)
             .map(|[a, b, c]| obvhs::triangle::Triangle {
                 v0: a.into(),
@@ -40,7 +46,6 @@ impl Obvhs {
                 v2: c.into(),
             })
             .collect();
-        let parameters = BvhBuildParams::fast_build();
         let tree = build_bvh2_from_tris(&triangles, parameters, &mut Duration::default());
         let ordered = tree.primitive_indices.iter();
         let triangles = ordered
@@ -63,6 +68,52 @@ impl Obvhs {
             .tree
             .ray_traverse(ray, &mut hit, |ray, id| self.triangles[id].intersect(ray));
         found.then_some(hit.t)
+    }
+
+    /// Whether anything is hit.
+    #[must_use]
+    pub fn is_occluded(&self, ray: &Ray) -> bool {
+        let ray = obvhs::ray::Ray::new(
+            Vec3A::from(ray.origin),
+            Vec3A::from(ray.direction),
+            ray.t_min,
+            ray.t_max,
+        );
+        // It says whether the ray missed.
+        !self
+            .tree
+            .ray_traverse_miss(ray, |ray, id| self.triangles[id].intersect(ray))
+    }
+
+    /// Puts the nodes into the order that refitting is fastest in.
+    pub fn order_nodes(&mut self) {
+        self.tree.reorder_in_stack_traversal_order();
+    }
+
+    /// Follows a mesh that deforms, leaves and precomputed triangles included.
+    pub fn refit(&mut self, mesh: &Mesh) {
+        let corners_of = |i: u32| {
+            let [a, b, c] = mesh.triangles[i as usize].map(|v| mesh.positions[v as usize]);
+            obvhs::triangle::Triangle {
+                v0: a.into(),
+                v1: b.into(),
+                v2: c.into(),
+            }
+        };
+        for (triangle, &i) in self.triangles.iter_mut().zip(&self.tree.primitive_indices) {
+            *triangle = RtTriangle::from(&corners_of(i));
+        }
+        for node in &mut self.tree.nodes {
+            if node.is_leaf() {
+                let first = node.first_index as usize;
+                let mut bounds = obvhs::aabb::Aabb::empty();
+                for &i in &self.tree.primitive_indices[first..first + node.prim_count as usize] {
+                    bounds = bounds.union(&obvhs::Boundable::aabb(&corners_of(i)));
+                }
+                node.set_aabb(bounds);
+            }
+        }
+        self.tree.refit_all();
     }
 }
 

@@ -66,6 +66,15 @@ impl Child {
     }
 }
 
+/// What a child of a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Member {
+    /// A node, by its place.
+    Node(usize),
+    /// A box, by its place in the order of the tree.
+    Box(usize),
+}
+
 impl BoxTree {
     /// The most boxes that a tree takes.
     pub const MAX_BOXES: usize = 1 << 31;
@@ -101,14 +110,13 @@ impl BoxTree {
         }
         let Builder { nodes, order, .. } = builder;
         let dispatch = Dispatch::new(Instructions::Detect);
-        Ok((
-            Self {
-                nodes,
-                boxes: boxes.len(),
-                dispatch,
-            },
-            order,
-        ))
+        let tree = Self {
+            nodes,
+            boxes: boxes.len(),
+            dispatch,
+        };
+        debug_assert!(tree.is_valid(boxes, &order));
+        Ok((tree, order))
     }
 
     /// Calls `visit` with the place, in the order that [`new`](Self::new) returned, of each box
@@ -135,6 +143,42 @@ impl BoxTree {
             },
             visit,
         );
+    }
+
+    /// The nodes, the root first: by lane what each child holds, and its box.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = [Option<(Member, Aabb)>; WIDTH]> + '_ {
+        self.nodes
+            .iter()
+            .map(|node| std::array::from_fn(|lane| node.get(lane)))
+    }
+
+    /// Whether every box occurs once and lies within all the boxes above it.
+    fn is_valid(&self, boxes: &[Aabb], order: &[u32]) -> bool {
+        let mut seen = vec![false; boxes.len()];
+        let mut waiting = Vec::new();
+        if !self.nodes.is_empty() {
+            waiting.push((0, None::<Aabb>));
+        }
+        while let Some((place, above)) = waiting.pop() {
+            for lane in 0..WIDTH {
+                let Some((member, bounds)) = self.nodes[place].get(lane) else {
+                    continue;
+                };
+                if above.is_some_and(|above| above.union(&bounds) != above) {
+                    return false;
+                }
+                match member {
+                    Member::Node(child) => waiting.push((child, Some(bounds))),
+                    Member::Box(place) => {
+                        let index = order[place] as usize;
+                        if bounds != boxes[index] || std::mem::replace(&mut seen[index], true) {
+                            return false;
+                        }
+                    }
+                }
+            }
+        }
+        seen.into_iter().all(|seen| seen)
     }
 
     /// How many boxes the tree holds.
@@ -329,6 +373,21 @@ impl Builder<'_> {
 }
 
 impl Node {
+    fn get(&self, lane: usize) -> Option<(Member, Aabb)> {
+        let side = |side: usize| Vec3::from_array(self.bounds.map(|axis| axis[side][lane]));
+        let bounds = Aabb {
+            min: side(0),
+            max: side(1),
+        };
+        let child = self.children[lane];
+        let member = if child.is_box() {
+            Member::Box(child.index())
+        } else {
+            Member::Node(child.index())
+        };
+        (!bounds.is_empty()).then_some((member, bounds))
+    }
+
     fn set(&mut self, lane: usize, bounds: &Aabb, child: Child) {
         for axis in 0..3 {
             self.bounds[axis][0][lane] = bounds.min[axis];

@@ -84,4 +84,22 @@ pub enum AccelError {
         /// The most that fit.
         limit: usize,
     },
+    /// An instance's transform is singular or not finite, or takes its mesh beyond the limit.
+    #[error(
+        "instance {instance} has a transform that is singular or not finite, or leads beyond {limit}"
+    )]
+    InvalidTransform {
+        /// Index of the first such instance.
+        instance: usize,
+        /// The largest magnitude that a coordinate may have, in metres.
+        limit: f32,
+    },
+    /// There is no such instance.
+    #[error("there is no instance {instance}, but only {instances}")]
+    NoSuchInstance {
+        /// The index given.
+        instance: usize,
+        /// How many there are.
+        instances: usize,
+    },
 }

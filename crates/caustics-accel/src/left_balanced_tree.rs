@@ -147,7 +147,8 @@ impl LeftBalancedTree {
             let last = heap.len() - 1;
             heap.swap(0, last);
         }
-        scratch.finish()
+        let found = heap.len();
+        scratch.finish(found)
     }
 
     /// Calls `visit` with the index and the squared distance of every point no farther than

@@ -30,9 +30,11 @@
 //!
 //! | structure | for |
 //! | --- | --- |
-//! | [`TriangleBvh`] | rays against triangles: one at a time, or [many](TriangleBvh::closest_hits) that keep together |
+//! | [`TriangleBvh`] | rays against triangles: one at a time, or [many](TriangleBvh::closest_hits) that keep together; start with this one |
+//! | [`InstanceBvh`] | meshes that move, or that stand in many places, without building them again |
+//! | [`TriangleKdTree`] | the classic rival, by the surface area heuristic or spatial medians, with a short stack or without any: to compare on a scene |
 //! | [`Intersect`] | the trait behind which an engine's own ray tracer can stand in |
-//! | [`PhotonTree`] | the k nearest photons, or all within a radius: start with this one |
+//! | [`PhotonTree`] | the k nearest photons, or all within a radius, of one point or of [many in order](PhotonTree::nearest_of_each): start with this one |
 //! | [`HashGrid`] | all photons within a radius known beforehand, rebuilt in every frame |
 //! | [`LeftBalancedTree`] | the classic photon map, without pointers, as a GPU would walk it; 16 bytes a photon |
 //! | [`BoxTree`] | all boxes that hold a point or overlap a box: footprints of photons, of any sizes |
@@ -46,9 +48,9 @@
 //! Traversal*, JCGT 2013). The tests send a million rays at the edges and a million at the
 //! vertices of a closed sphere of 20480 triangles from inside it, and none gets through; the same
 //! was seen of 10^8 rays at edges and 10^8 at vertices, each asked for its closest hit and for
-//! occlusion (`cargo test --release -p caustics-accel --test watertight -- --ignored`, a minute
-//! and a half). The control in those tests, a test after Möller and Trumbore, does let rays
-//! through.
+//! occlusion (`cargo test --release -p caustics-accel -- --ignored`, some minutes), and likewise of
+//! the kd-tree and of instances. The control in those tests, a test after Möller and Trumbore, does
+//! let rays through.
 //!
 //! # Deterministic
 //!
@@ -60,37 +62,51 @@
 //! # Limits
 //!
 //! Structures are built once; photons and triangles are not added to them later, though a tree can
-//! [follow](TriangleBvh::refit) a mesh that deforms. Coordinates must
+//! [follow](TriangleBvh::refit) a mesh that deforms, and instances [move](InstanceBvh::set_transforms). Coordinates must
 //! be finite, and those of triangles no larger than [`TriangleBvh::MAX_COORDINATE`]: both are
 //! checked. `NaN` and infinite rays and queries find nothing.
 //!
+//! # Speed
+//!
+//! `docs/acceleration.md` in the repository has what rays, builds and searches take, beside other
+//! libraries, and the command that measures it.
+//!
 //! # Features
 //!
-//! - `parallel` (default): builds on all threads of the current rayon pool.
+//! - `parallel` (default): builds and refits on all threads of the current rayon pool.
 //!
 //! # Sources
 //!
 //! Binary trees: PLOC and parallel reinsertion (Meister and Bittner 2018), by the crate obvhs.
-//! Collapse to eight children: Ylitie, Karras and Laine 2017. Photon trees: Jensen, *Realistic
+//! Collapse to eight children: Ylitie, Karras and Laine 2017. Kd-tree over triangles: built after
+//! Wald and Havran 2006; traversed with a short stack (Horn et al. 2007) or restarts (Foley and
+//! Sugerman 2005), guided by a trail of bits (Laine 2010). Photon trees: Jensen, *Realistic
 //! Image Synthesis Using Photon Mapping* (2001); Wald 2022 on the left-balanced layout. Hash grid:
 //! Teschner et al. 2003.
 
 mod box_tree;
 mod error;
 mod hash_grid;
+mod instance_bvh;
 mod intersect;
 mod left_balanced_tree;
 mod neighbour;
 mod photon_tree;
 mod simd;
 mod triangle_bvh;
+mod triangle_kd_tree;
+mod triangles;
 
 pub use box_tree::BoxTree;
 pub use error::AccelError;
 pub use hash_grid::HashGrid;
+pub use instance_bvh::{BvhInstance, InstanceBvh};
 pub use intersect::Intersect;
 pub use left_balanced_tree::LeftBalancedTree;
 pub use neighbour::{NearestScratch, Neighbour};
 pub use photon_tree::PhotonTree;
 pub use simd::Instructions;
 pub use triangle_bvh::{BvhOptions, BvhPreset, TriangleBvh};
+pub use triangle_kd_tree::{
+    KdTreeOptions, KdTreeSplit, KdTreeTraversal, TraversedKdTree, TriangleKdTree,
+};

@@ -13,7 +13,8 @@ pub struct Neighbour {
 /// more.
 #[derive(Clone, Debug, Default)]
 pub struct NearestScratch {
-    /// Candidates as sortable keys, see [`key`].
+    /// Candidates as sortable keys, see [`key`]; those that the last search did not write are left
+    /// over from others.
     pub(crate) keys: Vec<u64>,
     /// The result of the last search.
     pub(crate) neighbours: Vec<Neighbour>,
@@ -27,10 +28,10 @@ impl NearestScratch {
     }
 
     /// Turns the first `count` keys into the result, whose last element is the farthest.
-    pub(crate) fn finish(&mut self) -> &[Neighbour] {
+    pub(crate) fn finish(&mut self, count: usize) -> &[Neighbour] {
         self.neighbours.clear();
         self.neighbours
-            .extend(self.keys.iter().map(|&key| Neighbour {
+            .extend(self.keys[..count].iter().map(|&key| Neighbour {
                 index: index_of(key),
                 distance_squared: distance_squared_of(key),
             }));

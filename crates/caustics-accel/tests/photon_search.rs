@@ -132,6 +132,48 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn searches_in_order_find_what_single_ones_find(
+        positions in cloud(),
+        steps in prop::collection::vec((0_usize..400, prop::array::uniform3(-1.0_f32..1.0)), 1..30),
+        step in prop_oneof![Just(0.0_f32), Just(1e-21), Just(1e-3), Just(0.3), Just(20.0)],
+        count in prop_oneof![0_usize..4, 4_usize..60],
+        radius in prop_oneof![Just(f32::INFINITY), Just(3.0), Just(0.0)],
+        nan in 0_usize..60,
+    ) {
+        let tree = PhotonTree::new(&positions).unwrap();
+        let mut queries: Vec<Vec3> = Vec::new();
+        for (near, offset) in steps {
+            // A little from the last one, or from a photon.
+            let from = queries.last().copied().filter(|_| near % 3 > 0);
+            let from = from.or_else(|| positions.get(near).copied()).unwrap_or(Vec3::ZERO);
+            queries.push(from + Vec3::from_array(offset) * step);
+        }
+        if let Some(query) = queries.get_mut(nan) {
+            *query = Vec3::NAN;
+        }
+        let by_key = |found: &[caustics_accel::Neighbour]| {
+            let mut found = found.to_vec();
+            found.sort_by(|a, b| {
+                a.distance_squared.total_cmp(&b.distance_squared).then(a.index.cmp(&b.index))
+            });
+            found
+        };
+        let (mut scratch, mut other) = (NearestScratch::new(), NearestScratch::new());
+        let mut visited = 0;
+        tree.nearest_of_each(&queries, count, radius, &mut scratch, |place, found| {
+            assert_eq!(place, visited);
+            visited += 1;
+            let single = tree.nearest(queries[place], count, radius, &mut other);
+            assert_eq!(by_key(found), by_key(single), "query {place}: {}", queries[place]);
+        });
+        prop_assert_eq!(visited, queries.len());
+    }
+}
+
 #[test]
 fn a_hundred_thousand_photons_in_one_point() {
     let positions = vec![Vec3::new(0.3, -0.7, 5.0); 100_000];

@@ -50,23 +50,8 @@ impl World {
 
 impl Intersect for SceneIntersector {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut closest = self.triangles.closest_hit(ray);
-        let mut ray = *ray;
-        if let Some(hit) = closest {
-            ray.t_max = hit.t;
-        }
-        for (primitive, sphere) in (self.first_sphere..).zip(&self.spheres) {
-            if let Some(t) = sphere.intersect(&ray) {
-                ray.t_max = t;
-                closest = Some(Hit {
-                    t,
-                    u: 0.0,
-                    v: 0.0,
-                    primitive,
-                });
-            }
-        }
-        closest
+        let closest = self.triangles.closest_hit(ray);
+        closest_among(&self.spheres, self.first_sphere, ray, closest)
     }
 
     fn is_occluded(&self, ray: &Ray) -> bool {
@@ -76,4 +61,29 @@ impl Intersect for SceneIntersector {
                 .iter()
                 .any(|sphere| sphere.intersect(ray).is_some())
     }
+}
+
+/// The closest of a triangle's hit and those of spheres, which are numbered from `first` on.
+pub(crate) fn closest_among(
+    spheres: &[Sphere],
+    first: u32,
+    ray: &Ray,
+    mut closest: Option<Hit>,
+) -> Option<Hit> {
+    let mut ray = *ray;
+    if let Some(hit) = closest {
+        ray.t_max = hit.t;
+    }
+    for (primitive, sphere) in (first..).zip(spheres) {
+        if let Some(t) = sphere.intersect(&ray) {
+            ray.t_max = t;
+            closest = Some(Hit {
+                t,
+                u: 0.0,
+                v: 0.0,
+                primitive,
+            });
+        }
+    }
+    closest
 }

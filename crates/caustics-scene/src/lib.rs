@@ -73,6 +73,7 @@ pub mod builtin;
 mod camera;
 #[cfg(feature = "gltf")]
 pub mod gltf;
+mod instanced;
 mod intersector;
 mod light;
 mod light_point;
@@ -85,6 +86,7 @@ mod world;
 pub use area_light::AreaLight;
 pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
+pub use instanced::InstancedIntersector;
 pub use intersector::SceneIntersector;
 pub use light::{Light, LightError};
 pub use light_point::LightPoint;

@@ -130,6 +130,28 @@ impl Scene {
     /// Its mesh or material is not of this scene, its transform is singular or not finite, or it is
     /// a sphere without a radius or with a transform that would make it an ellipsoid.
     pub fn add_instance(&mut self, instance: Instance) -> Result<(), SceneError> {
+        self.check(&instance)?;
+        self.instances.push(instance);
+        Ok(())
+    }
+
+    /// Moves an object, given by its position in [`instances`](Self::instances).
+    ///
+    /// # Errors
+    /// There is no such object, or it could not have been added with this transform; it is then
+    /// where it was.
+    pub fn set_transform(&mut self, index: usize, transform: Affine3A) -> Result<(), SceneError> {
+        let Some(instance) = self.instances.get(index) else {
+            let count = self.instances.len();
+            return Err(SceneError::UnknownInstance { index, count });
+        };
+        let moved = instance.clone().with_transform(transform);
+        self.check(&moved)?;
+        self.instances[index] = moved;
+        Ok(())
+    }
+
+    fn check(&self, instance: &Instance) -> Result<(), SceneError> {
         let name = || instance.name.clone();
         if instance.material.0 >= self.materials.len() {
             return Err(SceneError::UnknownMaterial { name: name() });
@@ -154,7 +176,6 @@ impl Scene {
                 }
             }
         }
-        self.instances.push(instance);
         Ok(())
     }
 
@@ -323,6 +344,28 @@ pub enum SceneError {
     Ellipsoid {
         /// The object's name.
         name: String,
+    },
+    /// An object that the scene does not have.
+    #[error("there is no object {index}, but only {count}")]
+    UnknownInstance {
+        /// The position given.
+        index: usize,
+        /// How many objects there are.
+        count: usize,
+    },
+    /// A world that was flattened from another scene, or before this one changed.
+    #[error("the world does not have the scene's {count} objects in their places")]
+    AnotherWorld {
+        /// How many objects the scene has.
+        count: usize,
+    },
+    /// A mesh or an object that cannot be searched by rays.
+    #[error("object {name:?}: {source}")]
+    Acceleration {
+        /// The object's name; empty where all objects together are too many.
+        name: String,
+        /// Why not.
+        source: caustics_accel::AccelError,
     },
     /// An object that is not finite once in its place.
     #[error("object {name:?} is too large or too far away: {source}")]

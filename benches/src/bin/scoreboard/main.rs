@@ -4,8 +4,6 @@
 
 mod arguments;
 mod chart;
-mod conditions;
-mod document;
 mod flip;
 mod measure;
 mod metric;
@@ -15,6 +13,8 @@ mod tables;
 use std::fs;
 use std::process::ExitCode;
 
+use caustics_benches::conditions::conditions;
+use caustics_benches::document::with_tables;
 use caustics_benches::score::{Row, from_csv, peers_from_csv, to_csv};
 use caustics_benches::stage::{Failure, Stage};
 
@@ -54,7 +54,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Vec::new()
     };
     if arguments.measures {
-        let conditions = conditions::conditions(&arguments.machine);
+        let conditions = conditions(&arguments.machine);
         for name in &arguments.scenes {
             let stage = Stage::load(name)?;
             let measured = measure::measure(&stage, arguments, &conditions)?;
@@ -72,7 +72,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let document = fs::read_to_string(&arguments.document)
         .map_err(|error| format!("{}: {error}", arguments.document.display()))?;
-    let written = document::with_tables(&document, &tables::all(&rows, &peers))?;
+    let written = with_tables(&document, &tables::all(&rows, &peers))?;
     fs::write(&arguments.document, written)?;
     Ok(())
 }

@@ -1,13 +1,18 @@
 mod search;
 
-use caustics_geometry::glam::Vec3;
+use caustics_geometry::glam::{Vec3, Vec3A};
 
-use self::search::{Nearest, Search, Within, keep_nearest};
+use self::search::{Fold, Nearest, NearestWhere, Search};
 use crate::simd::{Dispatch, Row, WIDTH};
 use crate::{AccelError, Instructions, NearestScratch, Neighbour};
 
 /// Points in a bucket.
 const BUCKET: usize = 2 * WIDTH;
+
+/// Widens a sum of distances by more than rounding can shorten it.
+const WIDEN: f32 = 1.0 + 32.0 * f32::EPSILON;
+/// Added where distances are so small, in metres, that their squares lose digits.
+const TINY: f32 = 1e-18;
 
 /// Points above this number are partitioned on two threads.
 #[cfg(feature = "parallel")]
@@ -21,6 +26,7 @@ const PARALLEL_POINTS: usize = 8192;
 /// place of a heap. All buckets but the last are full: 17 bytes a point.
 ///
 /// Finds exactly what [`LeftBalancedTree`](crate::LeftBalancedTree) finds, several times faster.
+/// [`nearest_of_each`](Self::nearest_of_each) is faster still for many points in order.
 #[derive(Clone, Debug)]
 pub struct PhotonTree {
     buckets: Vec<Bucket>,
@@ -37,13 +43,14 @@ pub struct PhotonTree {
 struct Bucket {
     /// By axis, then by half of the bucket. Unused places are NaN, at no distance.
     positions: [[Row; 2]; 3],
-    indices: [u32; BUCKET],
+    /// By half of the bucket.
+    indices: [[u32; WIDTH]; 2],
 }
 
 impl Bucket {
     const EMPTY: Self = Self {
         positions: [[[f32::NAN; WIDTH]; 2]; 3],
-        indices: [u32::MAX; BUCKET],
+        indices: [[u32::MAX; WIDTH]; 2],
     };
 }
 
@@ -177,7 +184,54 @@ impl PhotonTree {
         max_radius: f32,
         scratch: &'scratch mut NearestScratch,
     ) -> &'scratch [Neighbour] {
-        self.nearest_where(point, count, max_radius, |_| true, scratch)
+        let mut found = 0;
+        if count > 0 {
+            let keys = &mut scratch.keys;
+            let nearest = Nearest::new(keys, &mut found, count.min(self.points));
+            self.dispatch.run(Search {
+                tree: self,
+                point: point.into(),
+                radius: max_radius,
+                collector: nearest,
+            });
+        }
+        scratch.finish(found)
+    }
+
+    /// The same as [`nearest`](Self::nearest) of one point after the other, faster where points
+    /// that follow each other lie close together, as those of pixels do; calls `visit` with each
+    /// one's place in `points` and its neighbours.
+    ///
+    /// No photon among the nearest is farther away than the farthest one of the query before plus
+    /// the step between both queries: each search starts with that as its radius.
+    pub fn nearest_of_each<P: Copy + Into<Vec3>>(
+        &self,
+        points: &[P],
+        count: usize,
+        max_radius: f32,
+        scratch: &mut NearestScratch,
+        mut visit: impl FnMut(usize, &[Neighbour]),
+    ) {
+        let mut before: Option<(Vec3, f32)> = None;
+        for (place, &point) in points.iter().enumerate() {
+            let point: Vec3 = point.into();
+            // Infinite without a query before, and NaN after one of NaN: then it does not count.
+            let reach = before.map_or(f32::INFINITY, |(point_before, farthest)| {
+                (farthest.sqrt() + point_before.distance(point)) * WIDEN + TINY
+            });
+            let radius = if reach < max_radius {
+                reach
+            } else {
+                max_radius
+            };
+            let found = self.nearest(point, count, radius, scratch);
+            // Fewer than wanted say nothing about what is farther away.
+            before = (found.len() == count)
+                .then(|| found.last())
+                .flatten()
+                .map(|farthest| (point, farthest.distance_squared));
+            visit(place, found);
+        }
     }
 
     /// Like [`nearest`](Self::nearest), among the points whose index `accept` approves of.
@@ -191,33 +245,57 @@ impl PhotonTree {
         accept: impl FnMut(u32) -> bool,
         scratch: &'scratch mut NearestScratch,
     ) -> &'scratch [Neighbour] {
-        scratch.keys.clear();
+        let mut found = 0;
         if count > 0 {
+            let keys = &mut scratch.keys;
+            let nearest = Nearest::new(keys, &mut found, count.min(self.points));
             self.dispatch.run(Search {
                 tree: self,
                 point: point.into(),
                 radius: max_radius,
-                collector: Nearest {
-                    keys: &mut scratch.keys,
-                    count,
-                    capacity: count,
-                    accept,
-                },
+                collector: NearestWhere { nearest, accept },
             });
-            keep_nearest(&mut scratch.keys, count);
         }
-        scratch.finish()
+        scratch.finish(found)
     }
 
     /// Calls `visit` with the index and the squared distance of every point no farther than
     /// `radius` metres from `point`.
-    pub fn within(&self, point: impl Into<Vec3>, radius: f32, visit: impl FnMut(u32, f32)) {
-        self.dispatch.run(Search {
+    pub fn within(&self, point: impl Into<Vec3>, radius: f32, mut visit: impl FnMut(u32, f32)) {
+        self.fold_within(point, radius, (), |(), index, distance_squared| {
+            visit(index, distance_squared);
+        });
+    }
+
+    /// Folds the index and the squared distance of every point no farther than `radius` metres from
+    /// `point` into a value.
+    ///
+    /// Summing up what belongs to the points is faster so than by a visit that adds to a variable,
+    /// which the compiler has to store after every point.
+    ///
+    /// ```
+    /// # use caustics_accel::PhotonTree;
+    /// let tree = PhotonTree::new(&[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [9.0, 0.0, 0.0]])?;
+    /// let flux = [1.0, 2.0, 4.0];
+    /// let gathered = tree.fold_within([0.0; 3], 1.0, 0.0, |sum, i, _| sum + flux[i as usize]);
+    /// assert_eq!(gathered, 3.0);
+    /// # Ok::<(), caustics_accel::AccelError>(())
+    /// ```
+    pub fn fold_within<T: Clone>(
+        &self,
+        point: impl Into<Vec3>,
+        radius: f32,
+        initial: T,
+        add: impl FnMut(T, u32, f32) -> T,
+    ) -> T {
+        let folded = self.dispatch.run(Search {
             tree: self,
             point: point.into(),
             radius,
-            collector: Within { visit },
+            collector: Fold::new(initial.clone(), add),
         });
+        // There always is one.
+        folded.unwrap_or(initial)
     }
 
     /// Renumbers the points in the order in which they lie in the tree and returns the former index
@@ -230,7 +308,7 @@ impl PhotonTree {
         for index in self
             .buckets
             .iter_mut()
-            .flat_map(|bucket| &mut bucket.indices)
+            .flat_map(|bucket| bucket.indices.as_flattened_mut())
         {
             if *index != u32::MAX {
                 former.push(std::mem::replace(index, former.len() as u32));
@@ -245,7 +323,7 @@ impl PhotonTree {
         let fresh = self
             .buckets
             .iter()
-            .flat_map(|bucket| bucket.indices)
+            .flat_map(|bucket| bucket.indices.into_iter().flatten())
             .all(|index| {
                 index == u32::MAX
                     || seen
@@ -260,7 +338,7 @@ impl PhotonTree {
                     bucket.positions[axis as usize]
                         .into_iter()
                         .flatten()
-                        .zip(bucket.indices)
+                        .zip(bucket.indices.into_iter().flatten())
                         .filter_map(|(x, index)| (index != u32::MAX).then_some(x))
                 })
         };
@@ -292,7 +370,7 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
             for axis in 0..3 {
                 bucket.positions[axis][place / WIDTH][place % WIDTH] = point.position[axis];
             }
-            bucket.indices[place] = point.index;
+            bucket.indices[place / WIDTH][place % WIDTH] = point.index;
         }
         return;
     }
@@ -305,7 +383,8 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
     let (left, first_right, _) = points.select_nth_unstable_by(left_count * BUCKET, compare);
     let mut largest = f32::NEG_INFINITY;
     for point in left {
-        largest = largest.max(point.position[axis]);
+        let x = point.position[axis];
+        largest = if x > largest { x } else { largest };
     }
     *split = Split {
         axis: axis as u32,
@@ -328,15 +407,22 @@ fn partition(points: &mut [Point], splits: &mut [Split], buckets: &mut [Bucket])
 }
 
 fn widest_axis(points: &[Point]) -> usize {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point.position[axis]);
-            high[axis] = high[axis].max(point.position[axis]);
+    // Two of each, so that one need not wait for the other.
+    let mut low = [Vec3A::INFINITY; 2];
+    let mut high = [Vec3A::NEG_INFINITY; 2];
+    let mut pairs = points.chunks_exact(2);
+    for pair in &mut pairs {
+        for side in 0..2 {
+            let position = Vec3A::from_array(pair[side].position);
+            low[side] = low[side].min(position);
+            high[side] = high[side].max(position);
         }
     }
-    let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+    for point in pairs.remainder() {
+        low[0] = low[0].min(Vec3A::from_array(point.position));
+        high[0] = high[0].max(Vec3A::from_array(point.position));
+    }
+    let extent = (high[0].max(high[1]) - low[0].min(low[1])).to_array();
     let widest = usize::from(extent[1] > extent[0]);
     if extent[2] > extent[widest] {
         2

@@ -3,8 +3,8 @@
 use caustics_geometry::glam::Vec3;
 
 use super::{PhotonTree, Subtree};
-use crate::neighbour::{distance_squared_of, key};
-use crate::simd::{Kernel, Lanes, Stack, WIDTH};
+use crate::neighbour::{distance_squared_of, index_of};
+use crate::simd::{Kernel, Lanes, Stack, WIDTH, next_lane};
 
 /// Enough for the far children on one path: the tree is balanced, with fewer than 2^32 buckets.
 const STACK: usize = 32;
@@ -20,56 +20,211 @@ struct Waiting {
 
 /// What becomes of the points that a search comes across.
 pub(super) trait Collector {
-    /// Takes a point no farther than the bound; returns the squared distance that counts from
-    /// then on, given the one that counted before.
-    fn take(&mut self, index: u32, distance_squared: f32, bound: f32) -> f32;
+    /// What is made of them.
+    type Output;
+
+    /// Takes the lanes that are no farther than the bound, at least one; returns the squared
+    /// distance that counts from then on, given the one that counted before.
+    fn take<L: Lanes>(
+        &mut self,
+        lanes: L,
+        indices: &[u32; WIDTH],
+        distances: L::Floats,
+        near: u32,
+        bound: f32,
+    ) -> f32;
+
+    /// There are no more.
+    fn finish(self) -> Self::Output;
 }
 
-pub(super) struct Within<V> {
-    pub(super) visit: V,
+/// How many points wait to be visited: a loop over many is foreseen better than many over few.
+const WAITING: usize = 16 * WIDTH;
+
+/// Folds all points into a value.
+pub(super) struct Fold<T, F> {
+    /// There but while it is being added to.
+    value: Option<T>,
+    add: F,
+    keys: [u64; WAITING],
+    waiting: usize,
 }
 
-impl<V: FnMut(u32, f32)> Collector for Within<V> {
+impl<T, F: FnMut(T, u32, f32) -> T> Fold<T, F> {
     #[inline(always)]
-    fn take(&mut self, index: u32, distance_squared: f32, bound: f32) -> f32 {
-        (self.visit)(index, distance_squared);
+    pub(super) fn new(value: T, add: F) -> Self {
+        Self {
+            value: Some(value),
+            add,
+            keys: [0; WAITING],
+            waiting: 0,
+        }
+    }
+}
+
+impl<T, F: FnMut(T, u32, f32) -> T> Collector for Fold<T, F> {
+    type Output = Option<T>;
+
+    #[inline(always)]
+    fn take<L: Lanes>(
+        &mut self,
+        lanes: L,
+        indices: &[u32; WIDTH],
+        distances: L::Floats,
+        near: u32,
+        bound: f32,
+    ) -> f32 {
+        if self.waiting > WAITING - WIDTH {
+            self.add_waiting();
+        }
+        append(
+            lanes,
+            &mut self.keys,
+            &mut self.waiting,
+            indices,
+            distances,
+            near,
+        );
         bound
+    }
+
+    #[inline(always)]
+    fn finish(mut self) -> Option<T> {
+        self.add_waiting();
+        self.value
+    }
+}
+
+impl<T, F: FnMut(T, u32, f32) -> T> Fold<T, F> {
+    #[inline(always)]
+    fn add_waiting(&mut self) {
+        if let Some(mut value) = self.value.take() {
+            for &key in &self.keys[..self.waiting] {
+                value = (self.add)(value, index_of(key), distance_squared_of(key));
+            }
+            self.value = Some(value);
+        }
+        self.waiting = 0;
+    }
+}
+
+/// Appends the keys of some lanes, given room for all eight.
+#[inline(always)]
+fn append<L: Lanes>(
+    lanes: L,
+    keys: &mut [u64],
+    found: &mut usize,
+    indices: &[u32; WIDTH],
+    distances: L::Floats,
+    near: u32,
+) {
+    if let Some(out) = keys[*found..].first_chunk_mut() {
+        lanes.pack(distances, indices, near, out);
+        *found += near.count_ones() as usize;
     }
 }
 
 /// Collects twice as many as wanted before it drops the farther half.
-pub(super) struct Nearest<'a, A> {
-    pub(super) keys: &'a mut Vec<u64>,
-    pub(super) count: usize,
+pub(super) struct Nearest<'a> {
+    keys: &'a mut Vec<u64>,
+    found: &'a mut usize,
+    count: usize,
     /// How many keys call for thinning out: the first time as many as are wanted, for a bound.
-    pub(super) capacity: usize,
-    pub(super) accept: A,
+    capacity: usize,
 }
 
-impl<A: FnMut(u32) -> bool> Collector for Nearest<'_, A> {
+impl<'a> Nearest<'a> {
+    pub(super) fn new(keys: &'a mut Vec<u64>, found: &'a mut usize, count: usize) -> Self {
+        // Thinned out only after a whole row.
+        let room = 2 * count + WIDTH;
+        if keys.len() < room {
+            keys.resize(room, 0);
+        }
+        Self {
+            keys,
+            found,
+            count,
+            capacity: count,
+        }
+    }
+
+    /// Thins out if there are too many.
     #[inline(always)]
-    fn take(&mut self, index: u32, distance_squared: f32, bound: f32) -> f32 {
-        if !(self.accept)(index) {
+    fn bound(&mut self, bound: f32) -> f32 {
+        if *self.found < self.capacity {
             return bound;
         }
-        self.keys.push(key(distance_squared, index));
-        if self.keys.len() < self.capacity {
-            return bound;
-        }
-        keep_nearest(self.keys, self.count);
-        self.capacity = self.count.saturating_mul(2);
+        keep_nearest(self.keys, self.found, self.count);
+        self.capacity = 2 * self.count;
         distance_squared_of(self.keys[self.count - 1])
     }
 }
 
-/// Drops all but the `count` lowest keys, at least one, and puts the highest of them last.
-pub(super) fn keep_nearest(keys: &mut Vec<u64>, count: usize) {
-    if keys.len() > count {
-        keys.select_nth_unstable(count - 1);
-        keys.truncate(count);
-    } else if let Some(farthest) = (0..keys.len()).max_by_key(|&place| keys[place]) {
-        let last = keys.len() - 1;
-        keys.swap(farthest, last);
+impl Collector for Nearest<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn take<L: Lanes>(
+        &mut self,
+        lanes: L,
+        indices: &[u32; WIDTH],
+        distances: L::Floats,
+        near: u32,
+        bound: f32,
+    ) -> f32 {
+        append(lanes, self.keys, self.found, indices, distances, near);
+        self.bound(bound)
+    }
+
+    #[inline(always)]
+    fn finish(self) {
+        keep_nearest(self.keys, self.found, self.count);
+    }
+}
+
+/// The same, of those that are accepted.
+pub(super) struct NearestWhere<'a, A> {
+    pub(super) nearest: Nearest<'a>,
+    pub(super) accept: A,
+}
+
+impl<A: FnMut(u32) -> bool> Collector for NearestWhere<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn take<L: Lanes>(
+        &mut self,
+        lanes: L,
+        indices: &[u32; WIDTH],
+        distances: L::Floats,
+        mut near: u32,
+        bound: f32,
+    ) -> f32 {
+        let mut accepted = 0;
+        while near != 0 {
+            let lane = next_lane(&mut near);
+            accepted |= u32::from((self.accept)(indices[lane])) << lane;
+        }
+        self.nearest
+            .take(lanes, indices, distances, accepted, bound)
+    }
+
+    #[inline(always)]
+    fn finish(self) {
+        self.nearest.finish();
+    }
+}
+
+/// Drops all but the `count` lowest of the first `found` keys, at least one, and puts the highest
+/// of them last.
+fn keep_nearest(keys: &mut [u64], found: &mut usize, count: usize) {
+    let taken = &mut keys[..*found];
+    if taken.len() > count {
+        taken.select_nth_unstable(count - 1);
+        *found = count;
+    } else if let Some(farthest) = (0..taken.len()).max_by_key(|&place| taken[place]) {
+        let last = taken.len() - 1;
+        taken.swap(farthest, last);
     }
 }
 
@@ -81,10 +236,10 @@ pub(super) struct Search<'a, C> {
 }
 
 impl<C: Collector> Kernel for Search<'_, C> {
-    type Output = ();
+    type Output = C::Output;
 
     #[inline(always)]
-    fn run<L: Lanes>(mut self, lanes: L) {
+    fn run<L: Lanes>(mut self, lanes: L) -> C::Output {
         let query = self.point.extend(0.0).to_array();
         let rows = [
             lanes.splat(query[0]),
@@ -96,7 +251,7 @@ impl<C: Collector> Kernel for Search<'_, C> {
         let mut stack = Stack::<Waiting, STACK>::new();
         let buckets = self.tree.buckets.len() as u32;
         if buckets == 0 {
-            return;
+            return self.collector.finish();
         }
         stack.push(Waiting {
             subtree: Subtree {
@@ -153,20 +308,13 @@ impl<C: Collector> Kernel for Search<'_, C> {
                 }
                 let [x, y, z] = distances;
                 let distances = lanes.add(lanes.add(x, y), z);
-                let mut near = lanes.bits(lanes.at_most(distances, lanes.splat(bound)));
-                if near == 0 {
-                    continue;
-                }
-                let distances = lanes.store(distances);
-                while near != 0 {
-                    let lane = near.trailing_zeros() as usize & 7;
-                    near &= near - 1;
-                    let index = bucket.indices[half * WIDTH + lane];
-                    if distances[lane] <= bound {
-                        bound = self.collector.take(index, distances[lane], bound);
-                    }
+                let near = lanes.bits(lanes.at_most(distances, lanes.splat(bound)));
+                if near != 0 {
+                    let indices = &bucket.indices[half];
+                    bound = self.collector.take(lanes, indices, distances, near, bound);
                 }
             }
         }
+        self.collector.finish()
     }
 }

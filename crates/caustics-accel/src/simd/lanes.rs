@@ -35,6 +35,18 @@ pub(crate) trait Lanes: Copy {
     fn or(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Lane 0 in the lowest bit.
     fn bits(self, mask: Self::Mask) -> u32;
+    /// For each lane whose bit is set, in order and without gaps: the bits of its float in the high
+    /// half and its tag in the low one. What is in `out` after them does not matter.
+    fn pack(self, a: Self::Floats, tags: &[u32; WIDTH], bits: u32, out: &mut [u64; WIDTH]);
+}
+
+/// Removes and returns the lowest set bit's index.
+#[inline(always)]
+pub(crate) fn next_lane(bits: &mut u32) -> usize {
+    // The mask tells the compiler that the lane is in range.
+    let lane = bits.trailing_zeros() as usize & 7;
+    *bits &= *bits - 1;
+    lane
 }
 
 /// Plain arrays, which the compiler turns into whatever the target has (SSE2, NEON).
@@ -141,5 +153,16 @@ impl Lanes for Portable {
             bits |= yes & (1 << lane);
         }
         bits
+    }
+
+    #[inline(always)]
+    fn pack(self, a: Row, tags: &[u32; WIDTH], mut bits: u32, out: &mut [u64; WIDTH]) {
+        for out in out {
+            if bits == 0 {
+                break;
+            }
+            let lane = next_lane(&mut bits);
+            *out = u64::from(a[lane].to_bits()) << 32 | u64::from(tags[lane]);
+        }
     }
 }

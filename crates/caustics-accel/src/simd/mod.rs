@@ -5,7 +5,7 @@ mod avx2;
 mod lanes;
 mod stack;
 
-pub(crate) use lanes::{Lanes, Row, WIDTH};
+pub(crate) use lanes::{Lanes, Row, WIDTH, next_lane};
 pub(crate) use stack::Stack;
 
 use self::lanes::Portable;

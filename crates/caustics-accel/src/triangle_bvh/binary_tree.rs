@@ -9,23 +9,29 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::BvhPreset;
 
-/// A binary tree whose leaves hold one triangle each; the root comes first.
+/// A binary tree whose leaves hold one triangle each.
+///
+/// The root comes first, then its left subtree, then its right one, and so on down: every subtree is
+/// a slice of nodes, and parents come before their children.
 pub(super) struct BinaryTree {
     pub(super) nodes: Vec<BinaryNode>,
-    /// The nodes' indices, children after their parents, each subtree in one piece.
-    pub(super) order: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BinaryNode {
     pub(super) low: Vec3A,
     pub(super) high: Vec3A,
-    /// The left child, which the right one follows; or the triangle.
-    pub(super) first: u32,
-    pub(super) is_leaf: bool,
+    /// How far the right child is behind its parent, which the left child follows; 0 for a leaf.
+    pub(super) right: u32,
+    /// A leaf's triangle.
+    pub(super) triangle: u32,
 }
 
 impl BinaryNode {
+    pub(super) fn is_leaf(&self) -> bool {
+        self.right == 0
+    }
+
     /// Half the surface area of the box.
     pub(super) fn half_area(&self) -> f32 {
         let size = self.high - self.low;
@@ -73,109 +79,97 @@ impl BinaryTree {
         if reinsertion > 0.0 {
             ReinsertionOptimizer::default().run(&mut tree, reinsertion, None);
         }
-        let nodes = tree.nodes.iter().map(|node| {
-            // A leaf of one triangle is numbered by its box.
-            let is_leaf = node.is_leaf();
-            let bounds = boxes[if is_leaf {
-                node.first_index as usize
+        Self::in_order(tree.nodes.len(), |node| {
+            let node = &tree.nodes[node as usize];
+            if node.is_leaf() {
+                // A leaf of one triangle is numbered by its box.
+                Linked::Leaf(boxes[node.first_index as usize])
             } else {
-                0
-            }];
-            let first = if is_leaf {
-                bounds.triangle
-            } else {
-                node.first_index
-            };
-            BinaryNode {
-                low: bounds.low,
-                high: bounds.high,
-                first,
-                is_leaf,
+                Linked::Children(node.first_index)
             }
-        });
-        let mut tree = Self::new(nodes.collect());
-        tree.refit();
-        tree
+        })
     }
 
-    fn new(nodes: Vec<BinaryNode>) -> Self {
-        let mut order = Vec::with_capacity(nodes.len());
+    /// Lays out a tree whose root has number 0 if there are any nodes. The boxes of inner nodes are
+    /// left to be computed.
+    fn in_order(count: usize, linked: impl Fn(u32) -> Linked) -> Self {
+        let mut nodes: Vec<BinaryNode> = Vec::with_capacity(count);
+        // Nodes, and of right children their parents' places.
         let mut waiting = Vec::new();
-        waiting.extend((!nodes.is_empty()).then_some(0));
-        while let Some(index) = waiting.pop() {
-            order.push(index);
-            let node = &nodes[index as usize];
-            if !node.is_leaf {
-                waiting.extend([node.first + 1, node.first]);
+        waiting.extend((count > 0).then_some((0, None)));
+        while let Some((number, parent)) = waiting.pop() {
+            let place = nodes.len();
+            if let Some(parent) = parent {
+                let parent: usize = parent;
+                nodes[parent].right = (place - parent) as u32;
             }
-        }
-        Self { nodes, order }
-    }
-
-    /// Computes the inner nodes' boxes from those of the leaves.
-    fn refit(&mut self) {
-        for &index in self.order.iter().rev() {
-            let node = self.nodes[index as usize];
-            if !node.is_leaf {
-                let left = self.nodes[node.first as usize];
-                let right = self.nodes[node.first as usize + 1];
-                let node = &mut self.nodes[index as usize];
-                node.low = left.low.min(right.low);
-                node.high = left.high.max(right.high);
+            let mut node = BinaryNode {
+                low: Vec3A::INFINITY,
+                high: Vec3A::NEG_INFINITY,
+                right: 0,
+                triangle: u32::MAX,
+            };
+            match linked(number) {
+                Linked::Leaf(bounds) => {
+                    (node.low, node.high) = (bounds.low, bounds.high);
+                    node.triangle = bounds.triangle;
+                }
+                Linked::Children(left) => {
+                    waiting.push((left + 1, Some(place)));
+                    waiting.push((left, None));
+                }
             }
+            nodes.push(node);
         }
+        Self { nodes }
     }
 
     /// Halves the triangles at the median of their centres: no deeper than their number's
     /// logarithm, however they lie.
     pub(super) fn halved(boxes: &[TriangleBounds]) -> Self {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        let placeholder = BinaryNode {
-            low: Vec3A::ZERO,
-            high: Vec3A::ZERO,
-            first: 0,
-            is_leaf: true,
-        };
-        let mut nodes = Vec::with_capacity(2 * boxes.len());
-        if boxes.is_empty() {
-            return Self::new(nodes);
+        let mut linked = Vec::with_capacity(2 * boxes.len());
+        let mut waiting = Vec::new();
+        if let Some(&first) = boxes.first() {
+            linked.push(Linked::Leaf(first));
+            waiting.push((0, 0, boxes.len()));
         }
-        nodes.push(placeholder);
-        let mut waiting = vec![(0, 0, boxes.len())];
         while let Some((node, start, end)) = waiting.pop() {
             let slice = &mut order[start..end];
-            let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-            let (mut low_center, mut high_center) = (low, high);
+            if let &mut [index] = slice {
+                linked[node] = Linked::Leaf(boxes[index as usize]);
+                continue;
+            }
+            let (mut low_center, mut high_center) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
             for &index in &*slice {
                 let bounds = &boxes[index as usize];
-                low = low.min(bounds.low);
-                high = high.max(bounds.high);
                 low_center = low_center.min(bounds.low + bounds.high);
                 high_center = high_center.max(bounds.low + bounds.high);
             }
-            nodes[node] = BinaryNode {
-                low,
-                high,
-                first: slice[0],
-                is_leaf: true,
+            let axis = (high_center - low_center).max_position();
+            let center = |index: u32| {
+                let bounds = &boxes[index as usize];
+                bounds.low[axis] + bounds.high[axis]
             };
-            if slice.len() > 1 {
-                let axis = (high_center - low_center).max_position();
-                let center = |index: u32| {
-                    let bounds = &boxes[index as usize];
-                    bounds.low[axis] + bounds.high[axis]
-                };
-                let middle = slice.len() / 2;
-                slice.select_nth_unstable_by(middle, |&a, &b| {
-                    center(a).total_cmp(&center(b)).then(a.cmp(&b))
-                });
-                nodes[node].first = nodes.len() as u32;
-                nodes[node].is_leaf = false;
-                waiting.push((nodes.len(), start, start + middle));
-                waiting.push((nodes.len() + 1, start + middle, end));
-                nodes.extend([placeholder; 2]);
-            }
+            let middle = slice.len() / 2;
+            slice.select_nth_unstable_by(middle, |&a, &b| {
+                center(a).total_cmp(&center(b)).then(a.cmp(&b))
+            });
+            let left = linked.len();
+            linked[node] = Linked::Children(left as u32);
+            waiting.push((left, start, start + middle));
+            waiting.push((left + 1, start + middle, end));
+            // Until it is their turn.
+            linked.extend([Linked::Children(0); 2]);
         }
-        Self::new(nodes)
+        Self::in_order(linked.len(), |node| linked[node as usize])
     }
+}
+
+/// A node of a tree laid out otherwise: a leaf, or the left child's number, which the right one's
+/// follows.
+#[derive(Clone, Copy)]
+enum Linked {
+    Leaf(TriangleBounds),
+    Children(u32),
 }

@@ -7,20 +7,20 @@ use crate::simd::{Row, WIDTH};
 /// An inner node: the bounding boxes of up to eight children, one to a lane.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// For each axis the lower and the upper bounds. An unused lane has an empty box, which no ray
     /// meets.
-    pub(super) bounds: [[Row; 2]; 3],
-    pub(super) children: [Child; WIDTH],
+    pub(crate) bounds: [[Row; 2]; 3],
+    pub(crate) children: [Child; WIDTH],
 }
 
 impl Node {
-    pub(super) const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         bounds: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
         children: [Child::EMPTY; WIDTH],
     };
 
-    pub(super) fn set(&mut self, lane: usize, low: [f32; 3], high: [f32; 3], child: Child) {
+    pub(crate) fn set(&mut self, lane: usize, low: [f32; 3], high: [f32; 3], child: Child) {
         for axis in 0..3 {
             self.bounds[axis][0][lane] = low[axis];
             self.bounds[axis][1][lane] = high[axis];
@@ -32,69 +32,54 @@ impl Node {
 /// Where a child is: a node, or a run of blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Zeroable)]
 #[repr(transparent)]
-pub(super) struct Child(pub(super) u32);
+pub(crate) struct Child(pub(super) u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
     const COUNT_BITS: u32 = 3;
     /// The most blocks in one leaf.
-    pub(super) const MAX_BLOCKS: usize = (1 << Self::COUNT_BITS) - 1;
+    pub(crate) const MAX_BLOCKS: usize = (1 << Self::COUNT_BITS) - 1;
     /// The most blocks in a tree, and more than the nodes above them.
-    pub(super) const MAX_BLOCK: usize = 1 << (31 - Self::COUNT_BITS);
+    pub(crate) const MAX_BLOCK: usize = 1 << (31 - Self::COUNT_BITS);
 
     /// A leaf without blocks.
-    pub(super) const EMPTY: Self = Self(Self::LEAF);
+    pub(crate) const EMPTY: Self = Self(Self::LEAF);
 
-    pub(super) fn node(index: usize) -> Self {
+    pub(crate) fn node(index: usize) -> Self {
         Self(index as u32)
     }
 
-    pub(super) fn leaf(first_block: usize, blocks: usize) -> Self {
+    pub(crate) fn leaf(first_block: usize, blocks: usize) -> Self {
         Self(Self::LEAF | ((first_block as u32) << Self::COUNT_BITS) | blocks as u32)
     }
 
+    /// The same child where nodes and blocks have moved to later places.
+    pub(crate) fn shifted(self, nodes: usize, blocks: usize) -> Self {
+        if self == Self::EMPTY {
+            self
+        } else if self.is_leaf() {
+            Self(self.0 + ((blocks as u32) << Self::COUNT_BITS))
+        } else {
+            Self(self.0 + nodes as u32)
+        }
+    }
+
     #[inline(always)]
-    pub(super) fn is_leaf(self) -> bool {
+    pub(crate) fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
     }
 
     /// Index of the node, if this is none of a leaf.
     #[inline(always)]
-    pub(super) fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 
     /// The leaf's blocks.
     #[inline(always)]
-    pub(super) fn blocks(self) -> std::ops::Range<usize> {
+    pub(crate) fn blocks(self) -> std::ops::Range<usize> {
         let first = ((self.0 & !Self::LEAF) >> Self::COUNT_BITS) as usize;
         first..first + (self.0 as usize & Self::MAX_BLOCKS)
-    }
-}
-
-/// Up to eight triangles of a leaf, one to a lane.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Block {
-    /// By vertex, then by axis. An unused lane is NaN, which no ray meets.
-    pub(super) vertices: [[Row; 3]; 3],
-    /// Indices in the caller's triangle list.
-    pub(super) primitives: [u32; WIDTH],
-}
-
-impl Block {
-    pub(super) const EMPTY: Self = Self {
-        vertices: [[[f32::NAN; WIDTH]; 3]; 3],
-        primitives: [u32::MAX; WIDTH],
-    };
-
-    pub(super) fn set(&mut self, lane: usize, triangle: [[f32; 3]; 3], primitive: u32) {
-        for (rows, vertex) in self.vertices.iter_mut().zip(triangle) {
-            for (row, coordinate) in rows.iter_mut().zip(vertex) {
-                row[lane] = coordinate;
-            }
-        }
-        self.primitives[lane] = primitive;
     }
 }
 
@@ -103,9 +88,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nodes_and_blocks_fill_whole_cache_lines() {
+    fn nodes_fill_whole_cache_lines() {
         assert_eq!(size_of::<Node>(), 256);
-        assert_eq!(size_of::<Block>(), 320);
     }
 
     #[test]
@@ -119,5 +103,8 @@ mod tests {
             assert_eq!(leaf.blocks(), first..first + blocks);
         }
         assert!(Child::EMPTY.blocks().is_empty());
+        assert_eq!(Child::node(7).shifted(3, 5), Child::node(10));
+        assert_eq!(Child::leaf(7, 2).shifted(3, 5), Child::leaf(12, 2));
+        assert_eq!(Child::EMPTY.shifted(3, 5), Child::EMPTY);
     }
 }

@@ -1,20 +1,22 @@
 mod binary_tree;
 mod collapse;
-mod layout;
-mod leaf_test;
+pub(crate) mod layout;
 mod refit;
 mod stream;
-mod traverse;
+pub(crate) mod traverse;
 
 use caustics_geometry::glam::{Vec3, Vec3A};
 use caustics_geometry::{Aabb, Hit, Ray};
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
 
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
-use self::layout::{Block, Child, Node};
+use self::layout::{Child, Node};
 use self::stream::ClosestHits;
 use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
 use crate::simd::Dispatch;
+use crate::triangles::{self, Block, can_be_hit, corners_of, validate};
 use crate::{AccelError, Instructions, Intersect};
 
 /// How much time to spend on building for the sake of tracing.
@@ -64,7 +66,8 @@ pub struct TriangleBvh {
     triangles: usize,
     /// Those that can be hit.
     stored: usize,
-    /// What a ray may expect to pay, when the tree was built.
+    /// What a ray may expect to pay now, and when the tree was built.
+    cost: f32,
     fresh_cost: f32,
     dispatch: Dispatch,
 }
@@ -72,7 +75,11 @@ pub struct TriangleBvh {
 impl TriangleBvh {
     /// The largest magnitude of a vertex coordinate, in metres: products of three of them fit an
     /// f32.
-    pub const MAX_COORDINATE: f32 = 1e11;
+    pub const MAX_COORDINATE: f32 = triangles::MAX_COORDINATE;
+
+    /// The [`cost_ratio`](Self::cost_ratio) above which a refitted tree had better be built anew:
+    /// rays then take about a quarter longer.
+    pub const REBUILD_RATIO: f32 = 1.5;
 
     /// The most triangles that a tree takes.
     pub const MAX_TRIANGLES: usize = Child::MAX_BLOCK;
@@ -85,32 +92,35 @@ impl TriangleBvh {
     /// # Errors
     /// [`AccelError::NonFiniteVertex`], [`AccelError::VertexTooFar`],
     /// [`AccelError::VertexOutOfRange`] or [`AccelError::TooManyTriangles`].
-    pub fn new<P: Copy + Into<Vec3>>(
+    pub fn new<P: Copy + Into<Vec3> + Sync>(
         positions: &[P],
         triangles: &[[u32; 3]],
         options: &BvhOptions,
     ) -> Result<Self, AccelError> {
-        validate(positions, triangles)?;
-        let corners = |triangle: u32| {
-            triangles[triangle as usize].map(|vertex| {
-                let position: Vec3 = positions[vertex as usize].into();
-                position.to_array()
-            })
+        validate(positions, triangles, Self::MAX_TRIANGLES)?;
+        let corners = |triangle: u32| corners_of(positions, triangles, triangle);
+        let bounds_of = |triangle: u32| {
+            let [a, b, c] = corners(triangle).map(Vec3A::from);
+            TriangleBounds {
+                low: a.min(b).min(c),
+                high: a.max(b).max(c),
+                triangle,
+            }
         };
-        let boxes: Vec<TriangleBounds> = (0..triangles.len() as u32)
-            .filter_map(|triangle| {
-                let [a, b, c] = corners(triangle).map(Vec3A::from);
-                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-                can_be_hit(low, high).then_some(TriangleBounds {
-                    low,
-                    high,
-                    triangle,
-                })
-            })
+        let all = 0..triangles.len() as u32;
+        #[cfg(feature = "parallel")]
+        let mut boxes: Vec<TriangleBounds> = all
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(bounds_of)
             .collect();
-        let mut wide = collapse(&BinaryTree::clustered(&boxes, options.preset), corners);
+        #[cfg(not(feature = "parallel"))]
+        let mut boxes: Vec<TriangleBounds> = all.map(bounds_of).collect();
+        boxes.retain(|bounds| can_be_hit(bounds.low, bounds.high));
+        let mut binary = BinaryTree::clustered(&boxes, options.preset);
+        let mut wide = collapse(&mut binary.nodes, &corners);
         if wide.depth > MAX_DEPTH {
-            wide = collapse(&BinaryTree::halved(&boxes), corners);
+            wide = collapse(&mut BinaryTree::halved(&boxes).nodes, &corners);
         }
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, bounds| {
             all.extend(Vec3::from(bounds.low))
@@ -129,10 +139,12 @@ impl TriangleBvh {
             bounds,
             triangles: triangles.len(),
             stored: boxes.len(),
+            cost: 0.0,
             fresh_cost: 0.0,
             dispatch: Dispatch::new(options.instructions),
         };
         tree.fresh_cost = tree.expected_cost();
+        tree.cost = tree.fresh_cost;
         debug_assert!(tree.is_valid());
         Ok(tree)
     }
@@ -177,7 +189,7 @@ impl TriangleBvh {
         });
     }
 
-    fn tree(&self) -> Tree<'_> {
+    pub(crate) fn tree(&self) -> Tree<'_> {
         Tree {
             nodes: &self.nodes,
             blocks: &self.blocks,
@@ -242,49 +254,4 @@ impl Intersect for TriangleBvh {
             ray,
         })
     }
-}
-
-/// A triangle that is a line along an axis or a point cannot be hit.
-fn can_be_hit(low: Vec3A, high: Vec3A) -> bool {
-    (high - low).cmpgt(Vec3A::ZERO).bitmask().count_ones() >= 2
-}
-
-fn validate<P: Copy + Into<Vec3>>(
-    positions: &[P],
-    triangles: &[[u32; 3]],
-) -> Result<(), AccelError> {
-    if triangles.len() > TriangleBvh::MAX_TRIANGLES {
-        return Err(AccelError::TooManyTriangles {
-            count: triangles.len(),
-            limit: TriangleBvh::MAX_TRIANGLES,
-        });
-    }
-    for (vertex, &position) in positions.iter().enumerate() {
-        let position: Vec3 = position.into();
-        if !position.is_finite() {
-            return Err(AccelError::NonFiniteVertex { vertex });
-        }
-        let coordinate = position.abs().max_element();
-        if coordinate > TriangleBvh::MAX_COORDINATE {
-            let limit = TriangleBvh::MAX_COORDINATE;
-            return Err(AccelError::VertexTooFar {
-                vertex,
-                coordinate,
-                limit,
-            });
-        }
-    }
-    for (triangle, corners) in triangles.iter().enumerate() {
-        for &vertex in corners {
-            if vertex as usize >= positions.len() {
-                let vertices = positions.len();
-                return Err(AccelError::VertexOutOfRange {
-                    triangle,
-                    vertex,
-                    vertices,
-                });
-            }
-        }
-    }
-    Ok(())
 }

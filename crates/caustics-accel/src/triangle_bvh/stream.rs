@@ -4,12 +4,11 @@ use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray};
 
 use super::layout::{Child, Node};
-use super::leaf_test::{Closest, ShearedRay};
 use super::traverse::{
-    STACK, Slabs, Tree, WIDEN, child_of, closest_hit, entry, is_usable, lower_end, near_of,
-    next_lane, search, splat,
+    InPlace, STACK, Slabs, Tree, child_of, closest_hit, entry, near_of, search, splat,
 };
-use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH};
+use crate::simd::{Kernel, Lanes, Row, Stack, WIDTH, next_lane};
+use crate::triangles::{Closest, ShearedRay, WIDEN, is_usable, lower_end};
 
 /// Rows of rays in a bundle.
 const ROWS: usize = 2;
@@ -111,8 +110,13 @@ fn trace<L: Lanes>(
                     let leaf = current.blocks();
                     sheared[lane].find_closest(lanes, tree.blocks, leaf, ray, closest);
                 } else {
-                    let slabs = rows[lane / WIDTH].slabs(lanes, hull.near_side, lane % WIDTH);
-                    search(lanes, tree, current, &slabs, &sheared[lane], ray, closest);
+                    let in_place = InPlace {
+                        slabs: rows[lane / WIDTH].slabs(lanes, hull.near_side, lane % WIDTH),
+                        sheared: &sheared[lane],
+                        blocks: tree.blocks,
+                        ray,
+                    };
+                    search(lanes, tree.nodes, current, &in_place, closest);
                 }
                 if closest.limit < before {
                     rows[lane / WIDTH].limit[lane % WIDTH] = closest.limit * WIDEN;

@@ -2,22 +2,22 @@
 
 use caustics_geometry::{Hit, Ray};
 
-use super::layout::{Block, Child, Node};
-use super::leaf_test::{Closest, ShearedRay};
-use crate::simd::{Kernel, Lanes, Row, Stack};
+use super::layout::{Child, Node};
+use crate::simd::{Kernel, Lanes, Row, Stack, next_lane};
+use crate::triangles::{Block, Closest, ShearedRay, WIDEN, is_usable, lower_end};
 
 /// What traversal reads.
 #[derive(Clone, Copy)]
-pub(super) struct Tree<'a> {
-    pub(super) nodes: &'a [Node],
-    pub(super) blocks: &'a [Block],
-    pub(super) root: Child,
+pub(crate) struct Tree<'a> {
+    pub(crate) nodes: &'a [Node],
+    pub(crate) blocks: &'a [Block],
+    pub(crate) root: Child,
 }
 
 /// The closest hit of a ray.
-pub(super) struct ClosestHit<'a> {
-    pub(super) tree: Tree<'a>,
-    pub(super) ray: &'a Ray,
+pub(crate) struct ClosestHit<'a> {
+    pub(crate) tree: Tree<'a>,
+    pub(crate) ray: &'a Ray,
 }
 
 impl Kernel for ClosestHit<'_> {
@@ -30,9 +30,9 @@ impl Kernel for ClosestHit<'_> {
 }
 
 /// Whether a ray hits anything.
-pub(super) struct Occlusion<'a> {
-    pub(super) tree: Tree<'a>,
-    pub(super) ray: &'a Ray,
+pub(crate) struct Occlusion<'a> {
+    pub(crate) tree: Tree<'a>,
+    pub(crate) ray: &'a Ray,
 }
 
 impl Kernel for Occlusion<'_> {
@@ -45,42 +45,33 @@ impl Kernel for Occlusion<'_> {
 }
 
 /// Entries that wait at most; see [`MAX_DEPTH`].
-pub(super) const STACK: usize = 512;
+pub(crate) const STACK: usize = 512;
 
 /// Levels of nodes that the stack suffices for: each leaves at most seven children waiting, and
 /// the last one puts all eight on the stack for a moment.
-pub(super) const MAX_DEPTH: usize = (STACK - 1) / 7;
-
-/// Widens the far side of every box, so that no rounding lets a ray slip between two of them.
-///
-/// With e = 2^-24, a computed slab distance (b - o) * (1/d) is off by a factor of at most
-/// (1 + e)^3, the near and the far one together by 6 e. The leaf test sees the ray through
-/// vertices whose sheared x and y are off by a factor of at most (1 + e)^5, which shifts where it
-/// crosses the two slabs by another 10 e. 20 e covers both and the rounding of this product
-/// (after Ize, *Robust BVH Ray Traversal*, JCGT 2013, whose factor covers the slabs alone).
-pub(super) const WIDEN: f32 = 1.0 + 20.0 * (f32::EPSILON / 2.0);
+pub(crate) const MAX_DEPTH: usize = (STACK - 1) / 7;
 
 /// A ray for the test against boxes.
-pub(super) struct Slabs<F> {
+pub(crate) struct Slabs<F> {
     /// By axis.
-    pub(super) origin: [F; 3],
+    pub(crate) origin: [F; 3],
     /// Reciprocal of the direction, by axis, for the side of a box where the ray enters ...
-    pub(super) inverse_near: [F; 3],
+    pub(crate) inverse_near: [F; 3],
     /// ... and for the side where it leaves.
-    pub(super) inverse_far: [F; 3],
+    pub(crate) inverse_far: [F; 3],
     /// By axis, 0 where the ray enters through the lower bound and 1 where through the upper one.
-    pub(super) near_side: [usize; 3],
-    pub(super) t_min: F,
+    pub(crate) near_side: [usize; 3],
+    pub(crate) t_min: F,
 }
 
 #[inline(always)]
-pub(super) fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
+pub(crate) fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
     [lanes.splat(x), lanes.splat(y), lanes.splat(z)]
 }
 
 impl<F: Copy> Slabs<F> {
     #[inline(always)]
-    fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Self {
+    pub(crate) fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
         let inverse = direction.map(|d| 1.0 / d);
@@ -95,7 +86,7 @@ impl<F: Copy> Slabs<F> {
 
     /// Where the ray enters the children's boxes, and which ones it meets before `limit`.
     #[inline(always)]
-    fn meet<L: Lanes<Floats = F>>(&self, lanes: L, node: &Node, limit: F) -> (F, u32) {
+    pub(crate) fn meet<L: Lanes<Floats = F>>(&self, lanes: L, node: &Node, limit: F) -> (F, u32) {
         // A ray that runs in the plane of a box's side has 0 * inf = NaN there. Such a ray counts
         // as inside that slab: the minimum and maximum pass over a NaN in their first argument.
         let mut near = self.t_min;
@@ -119,41 +110,57 @@ impl<F: Copy> Slabs<F> {
 /// A waiting child, ordered by where the ray enters its box: never a negative number, so that its
 /// bits are ordered as it is.
 #[inline(always)]
-pub(super) fn entry(near: f32, child: Child) -> u64 {
+pub(crate) fn entry(near: f32, child: Child) -> u64 {
     (u64::from(near.to_bits()) << 32) | u64::from(child.0)
 }
 
 #[inline(always)]
-pub(super) fn child_of(entry: u64) -> Child {
+pub(crate) fn child_of(entry: u64) -> Child {
     Child(entry as u32)
 }
 
 #[inline(always)]
-pub(super) fn near_of(entry: u64) -> f32 {
+pub(crate) fn near_of(entry: u64) -> f32 {
     f32::from_bits((entry >> 32) as u32)
 }
 
-/// Removes and returns the lowest set bit's index.
-#[inline(always)]
-pub(super) fn next_lane(bits: &mut u32) -> usize {
-    // The mask tells the compiler that the lane is in range.
-    let lane = bits.trailing_zeros() as usize & 7;
-    *bits &= *bits - 1;
-    lane
+/// A ray as the boxes and leaves of a tree meet it.
+pub(crate) trait Meet<L: Lanes> {
+    /// Where the ray enters the children's boxes, and which ones it meets before `limit`.
+    fn boxes(&self, lanes: L, node: &Node, limit: L::Floats) -> (L::Floats, u32);
+
+    /// Looks for something closer in a leaf.
+    fn find_closest(&self, lanes: L, leaf: Child, closest: &mut Closest);
+
+    /// Whether anything in a leaf is hit at no more than `limit`.
+    fn hits_any(&self, lanes: L, leaf: Child, limit: f32) -> bool;
 }
 
-/// Whether a ray can hit anything: it is finite and its range is not empty.
-#[inline(always)]
-pub(super) fn is_usable(ray: &Ray) -> bool {
-    // The comparison also turns away a NaN.
-    ray.origin.is_finite() && ray.direction.is_finite() && lower_end(ray) < ray.t_max
+/// A ray and the triangles of a tree, both where the caller has them.
+pub(crate) struct InPlace<'a, F> {
+    pub(crate) slabs: Slabs<F>,
+    pub(crate) sheared: &'a ShearedRay,
+    pub(crate) blocks: &'a [Block],
+    pub(crate) ray: &'a Ray,
 }
 
-/// Lower end of the ray's range: boxes are entered at no negative parameter.
-#[inline(always)]
-pub(super) fn lower_end(ray: &Ray) -> f32 {
-    // A negative zero would sort above everything.
-    ray.t_min.max(0.0) + 0.0
+impl<L: Lanes> Meet<L> for InPlace<'_, L::Floats> {
+    #[inline(always)]
+    fn boxes(&self, lanes: L, node: &Node, limit: L::Floats) -> (L::Floats, u32) {
+        self.slabs.meet(lanes, node, limit)
+    }
+
+    #[inline(always)]
+    fn find_closest(&self, lanes: L, leaf: Child, closest: &mut Closest) {
+        self.sheared
+            .find_closest(lanes, self.blocks, leaf.blocks(), self.ray, closest);
+    }
+
+    #[inline(always)]
+    fn hits_any(&self, lanes: L, leaf: Child, limit: f32) -> bool {
+        self.sheared
+            .hits_any(lanes, self.blocks, leaf.blocks(), self.ray, limit)
+    }
 }
 
 /// Chooses the nearest of the children that are met, of which there is at least one; the others
@@ -189,25 +196,28 @@ fn descend(stack: &mut Stack<u64, STACK>, node: &Node, mut met: u32, near: &Row)
 }
 
 #[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
+pub(crate) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
     if !is_usable(ray) {
         return None;
     }
     let mut closest = Closest::new(ray);
-    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
-    search(lanes, tree, tree.root, &slabs, &sheared, ray, &mut closest);
+    let in_place = InPlace {
+        slabs: Slabs::new(lanes, ray),
+        sheared: &ShearedRay::new(ray),
+        blocks: tree.blocks,
+        ray,
+    };
+    search(lanes, tree.nodes, tree.root, &in_place, &mut closest);
     closest.hit
 }
 
 /// Looks below one child for something closer.
 #[inline(always)]
-pub(super) fn search<L: Lanes>(
+pub(crate) fn search<L: Lanes>(
     lanes: L,
-    tree: Tree<'_>,
+    nodes: &[Node],
     start: Child,
-    slabs: &Slabs<L::Floats>,
-    sheared: &ShearedRay,
-    ray: &Ray,
+    ray: &impl Meet<L>,
     closest: &mut Closest,
 ) {
     let mut widened = closest.limit * WIDEN;
@@ -215,15 +225,15 @@ pub(super) fn search<L: Lanes>(
     let mut current = start;
     loop {
         while !current.is_leaf() {
-            let node = &tree.nodes[current.index()];
-            let (near, met) = slabs.meet(lanes, node, lanes.splat(widened));
+            let node = &nodes[current.index()];
+            let (near, met) = ray.boxes(lanes, node, lanes.splat(widened));
             if met == 0 {
                 break;
             }
             current = descend(&mut stack, node, met, &lanes.store(near));
         }
         if current.is_leaf() {
-            sheared.find_closest(lanes, tree.blocks, current.blocks(), ray, closest);
+            ray.find_closest(lanes, current, closest);
             widened = closest.limit * WIDEN;
         }
         loop {
@@ -243,23 +253,43 @@ fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
     if !is_usable(ray) {
         return false;
     }
-    let (slabs, sheared) = (Slabs::new(lanes, ray), ShearedRay::new(ray));
-    let limit = ray.t_max.next_down();
+    let in_place = InPlace {
+        slabs: Slabs::new(lanes, ray),
+        sheared: &ShearedRay::new(ray),
+        blocks: tree.blocks,
+        ray,
+    };
+    search_any(
+        lanes,
+        tree.nodes,
+        tree.root,
+        &in_place,
+        ray.t_max.next_down(),
+    )
+}
+
+/// Looks below one child for anything at no more than `limit`.
+#[inline(always)]
+pub(crate) fn search_any<L: Lanes>(
+    lanes: L,
+    nodes: &[Node],
+    start: Child,
+    ray: &impl Meet<L>,
+    limit: f32,
+) -> bool {
     let widened = lanes.splat(limit * WIDEN);
-    let mut stack = Stack::<u64, STACK>::new();
-    stack.push(u64::from(tree.root.0));
-    while let Some(next) = stack.pop() {
-        let current = child_of(next);
+    let mut stack = Stack::<Child, STACK>::new();
+    stack.push(start);
+    while let Some(current) = stack.pop() {
         if current.is_leaf() {
-            let leaf = current.blocks();
-            if sheared.hits_any(lanes, tree.blocks, leaf, ray, limit) {
+            if ray.hits_any(lanes, current, limit) {
                 return true;
             }
         } else {
-            let node = &tree.nodes[current.index()];
-            let (_, mut met) = slabs.meet(lanes, node, widened);
+            let node = &nodes[current.index()];
+            let (_, mut met) = ray.boxes(lanes, node, widened);
             while met != 0 {
-                stack.push(u64::from(node.children[next_lane(&mut met)].0));
+                stack.push(node.children[next_lane(&mut met)]);
             }
         }
     }

@@ -3,6 +3,8 @@
 // Each test program uses a part of this.
 #![allow(dead_code)]
 
+pub(crate) mod brute_force;
+
 use std::collections::HashMap;
 
 use caustics_geometry::Ray;

@@ -3,9 +3,11 @@
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use caustics_benches::score::Conditions;
+use crate::score::Conditions;
 
-pub(crate) fn conditions(machine: &str) -> Conditions {
+/// The conditions of now, on a machine of the given class.
+#[must_use]
+pub fn conditions(machine: &str) -> Conditions {
     let days = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0, |elapsed| elapsed.as_secs() / 86_400);

@@ -5,13 +5,13 @@ use std::ops::Range;
 use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray, WatertightRay};
 
-use super::layout::Block;
-use super::traverse::{lower_end, next_lane};
-use crate::simd::{Lanes, Row};
+use super::block::Block;
+use super::query::lower_end;
+use crate::simd::{Lanes, Row, next_lane};
 
 /// A ray for Woop's test.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ShearedRay {
+pub(crate) struct ShearedRay {
     /// The axis along which the direction is longest comes last.
     axes: [usize; 3],
     /// In the order of `axes`.
@@ -23,25 +23,32 @@ pub(super) struct ShearedRay {
 
 /// The closest hit so far.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Closest {
+pub(crate) struct Closest {
     /// Hits at exactly this parameter count, so that of two at the same place the one with the
     /// lower index wins, whichever is found first.
-    pub(super) limit: f32,
-    pub(super) hit: Option<Hit>,
+    pub(crate) limit: f32,
+    pub(crate) hit: Option<Hit>,
+    /// Added to the triangles' numbers in the blocks.
+    pub(crate) first: u32,
 }
 
 impl Closest {
     /// Before anything is hit.
     #[inline(always)]
-    pub(super) fn new(ray: &Ray) -> Self {
+    pub(crate) fn new(ray: &Ray) -> Self {
         Self {
             limit: ray.t_max.next_down(),
             hit: None,
+            first: 0,
         }
     }
 
     #[inline(always)]
     fn offer(&mut self, hit: Hit) {
+        let hit = Hit {
+            primitive: hit.primitive + self.first,
+            ..hit
+        };
         let nearer = self.hit.is_none_or(|than| {
             hit.t < than.t || (hit.t == than.t && hit.primitive < than.primitive)
         });
@@ -54,7 +61,7 @@ impl Closest {
 
 impl ShearedRay {
     #[inline(always)]
-    pub(super) fn new(ray: &Ray) -> Self {
+    pub(crate) fn new(ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
         let longest = ray.direction.abs().max_position();
@@ -74,7 +81,7 @@ impl ShearedRay {
 
     /// Tests all triangles of a leaf.
     #[inline(always)]
-    pub(super) fn find_closest<L: Lanes>(
+    pub(crate) fn find_closest<L: Lanes>(
         &self,
         lanes: L,
         blocks: &[Block],
@@ -113,7 +120,7 @@ impl ShearedRay {
 
     /// Whether any triangle of a leaf is hit at no more than `limit`.
     #[inline(always)]
-    pub(super) fn hits_any<L: Lanes>(
+    pub(crate) fn hits_any<L: Lanes>(
         &self,
         lanes: L,
         blocks: &[Block],

@@ -1,15 +1,12 @@
 //! A Markdown file between whose marks tables are rewritten.
 
-use caustics_benches::stage::Failure;
+use crate::stage::Failure;
 
 /// Puts each table between the marks `<!-- begin: NAME -->` and `<!-- end: NAME -->` of its name.
 ///
 /// # Errors
 /// If a pair of marks is missing.
-pub(crate) fn with_tables(
-    document: &str,
-    tables: &[(&'static str, String)],
-) -> Result<String, Failure> {
+pub fn with_tables(document: &str, tables: &[(&'static str, String)]) -> Result<String, Failure> {
     let mut text = document.to_owned();
     for (name, table) in tables {
         let begin = format!("<!-- begin: {name} -->\n");

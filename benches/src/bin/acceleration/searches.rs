@@ -1,0 +1,425 @@
+//! Photons near a point.
+
+use std::num::NonZeroUsize;
+
+use caustics_accel::{HashGrid, LeftBalancedTree, NearestScratch, PhotonTree};
+use caustics_benches::photons::{pixel_queries, surface_photons};
+use caustics_benches::stage::Failure;
+use glam::Vec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nanoflann::{KdTree, KdTreeParams, L2Simple, MatrixDataset, MatrixLayout, SearchParameters};
+use rayon::prelude::*;
+
+use crate::arguments::Arguments;
+use crate::contest::{Contestant, Time, medians, pool};
+use crate::tables::{Table, figures};
+
+/// Queries that a thread takes at a time.
+const CHUNK: usize = 256;
+
+/// What belongs to a photon: flux in three colours.
+type Payload = Vec<[f32; 3]>;
+
+/// A way to answer queries, which returns the sum of what belongs to the photons found: what a
+/// radiance estimate reads.
+type Searcher<'a> = (&'static str, Box<dyn Fn(&[Vec3]) -> f64 + Sync + 'a>);
+
+/// Photons and everything that finds them, and what belongs to them in each one's order.
+struct Field<'a> {
+    ours: PhotonTree,
+    ours_payload: Payload,
+    classic: LeftBalancedTree,
+    grids: [(HashGrid, Payload); 2],
+    kiddo: ImmutableKdTree<f32, 3>,
+    nanoflann: KdTree<'a, f32, MatrixDataset<f32>, L2Simple>,
+    payload: Payload,
+}
+
+fn sum(payload: &[[f32; 3]], index: u32) -> f64 {
+    let [r, g, b] = payload[index as usize];
+    f64::from(r + g + b)
+}
+
+fn reordered(payload: &Payload, order: &[u32]) -> Payload {
+    order.iter().map(|&i| payload[i as usize]).collect()
+}
+
+/// A question: how many photons at most, or all, within what radius.
+#[derive(Clone, Copy)]
+struct Question {
+    title: &'static str,
+    count: Option<usize>,
+    radius: f32,
+    /// Which of the grids has cells of a size for it.
+    grid: usize,
+}
+
+impl Field<'_> {
+    fn searchers(&self, question: Question) -> Vec<Searcher<'_>> {
+        let Question { count, radius, .. } = question;
+        let mut searchers: Vec<Searcher<'_>> = Vec::new();
+        if let Some(count) = count {
+            let wanted = NonZeroUsize::new(count).expect("positive");
+            searchers.push((
+                "kiddo",
+                Box::new(move |queries| {
+                    let total = queries.iter().map(|q| {
+                        let point = q.to_array();
+                        let query = self
+                            .kiddo
+                            .query(&point)
+                            .nearest_n::<SquaredEuclidean<f32>>(wanted);
+                        let found = if radius.is_finite() {
+                            query.within(radius * radius).unsorted().execute()
+                        } else {
+                            query.unsorted().execute()
+                        };
+                        found
+                            .iter()
+                            .map(|n| sum(&self.payload, n.item))
+                            .sum::<f64>()
+                    });
+                    total.sum()
+                }),
+            ));
+            if radius.is_infinite() {
+                searchers.push((
+                    "nanoflann",
+                    Box::new(move |queries| {
+                        let total = queries.iter().map(|q| {
+                            let found = self.nanoflann.knn_search(&q.to_array(), count);
+                            let found = found.expect("a valid query");
+                            found
+                                .iter()
+                                .map(|n| sum(&self.payload, n.index as u32))
+                                .sum::<f64>()
+                        });
+                        total.sum()
+                    }),
+                ));
+            }
+            searchers.push((
+                "**PhotonTree**",
+                Box::new(move |queries| {
+                    let mut scratch = NearestScratch::new();
+                    let total = queries.iter().map(|&q| {
+                        let found = self.ours.nearest(q, count, radius, &mut scratch);
+                        found
+                            .iter()
+                            .map(|n| sum(&self.ours_payload, n.index))
+                            .sum::<f64>()
+                    });
+                    total.sum()
+                }),
+            ));
+            searchers.push((
+                "**PhotonTree, in order**",
+                Box::new(move |queries| {
+                    let mut scratch = NearestScratch::new();
+                    let mut total = 0.0;
+                    self.ours
+                        .nearest_of_each(queries, count, radius, &mut scratch, |_, found| {
+                            let payload = &self.ours_payload;
+                            total += found.iter().map(|n| sum(payload, n.index)).sum::<f64>();
+                        });
+                    total
+                }),
+            ));
+            searchers.push((
+                "**LeftBalancedTree**",
+                Box::new(move |queries| {
+                    let mut scratch = NearestScratch::new();
+                    let total = queries.iter().map(|&q| {
+                        let found = self.classic.nearest(q, count, radius, &mut scratch);
+                        found
+                            .iter()
+                            .map(|n| sum(&self.payload, n.index))
+                            .sum::<f64>()
+                    });
+                    total.sum()
+                }),
+            ));
+            return searchers;
+        }
+        searchers.push((
+            "kiddo",
+            Box::new(move |queries| {
+                let total = queries.iter().map(|q| {
+                    let point = q.to_array();
+                    let query = self
+                        .kiddo
+                        .query(&point)
+                        .within::<SquaredEuclidean<f32>>(radius * radius);
+                    let found = query.unsorted().execute();
+                    found
+                        .iter()
+                        .map(|n| sum(&self.payload, n.item))
+                        .sum::<f64>()
+                });
+                total.sum()
+            }),
+        ));
+        let parameters = SearchParameters {
+            sorted: false,
+            ..SearchParameters::default()
+        };
+        searchers.push((
+            "nanoflann",
+            Box::new(move |queries| {
+                let total = queries.iter().map(|q| {
+                    let found = self.nanoflann.radius_search_with_params(
+                        &q.to_array(),
+                        radius * radius,
+                        parameters,
+                    );
+                    let found = found.expect("a valid query");
+                    found
+                        .iter()
+                        .map(|n| sum(&self.payload, n.index as u32))
+                        .sum::<f64>()
+                });
+                total.sum()
+            }),
+        ));
+        searchers.push((
+            "**PhotonTree**",
+            Box::new(move |queries| {
+                let total = queries.iter().map(|&q| {
+                    self.ours.fold_within(q, radius, 0.0, |total, index, _| {
+                        total + sum(&self.ours_payload, index)
+                    })
+                });
+                total.sum()
+            }),
+        ));
+        searchers.push((
+            "**LeftBalancedTree**",
+            Box::new(move |queries| {
+                let mut total = 0.0;
+                for &q in queries {
+                    self.classic
+                        .within(q, radius, |index, _| total += sum(&self.payload, index));
+                }
+                total
+            }),
+        ));
+        let (grid, payload) = &self.grids[question.grid];
+        searchers.push((
+            "**HashGrid**",
+            Box::new(move |queries| {
+                let mut total = 0.0;
+                for &q in queries {
+                    grid.within(q, radius, |index, _| total += sum(payload, index));
+                }
+                total
+            }),
+        ));
+        searchers
+    }
+}
+
+/// Times of builds and of answers to one question.
+struct Column {
+    title: String,
+    /// For each number of threads.
+    times: Vec<Vec<Time>>,
+}
+
+fn build_times(photons: &[Vec3], cell: f32, arguments: &Arguments) -> Result<Column, Failure> {
+    let rows: Vec<[f32; 3]> = photons.iter().map(Vec3::to_array).collect();
+    let flat: Vec<f32> = rows.iter().flatten().copied().collect();
+    let dataset = MatrixDataset::new(flat, rows.len(), 3, MatrixLayout::RowMajorPoints)?;
+    let mut times = Vec::new();
+    for &threads in arguments.threads() {
+        times.push(pool(threads)?.install(|| {
+            medians(
+                vec![
+                    Contestant::new("kiddo", || {
+                        let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&rows);
+                        u64::from(tree.is_ok())
+                    }),
+                    Contestant::new("nanoflann", || {
+                        let tree = KdTree::new(3, &dataset, L2Simple, KdTreeParams::default());
+                        u64::from(tree.is_ok())
+                    }),
+                    Contestant::new("**PhotonTree**", || {
+                        PhotonTree::new(photons).map_or(0, |tree| tree.len() as u64)
+                    }),
+                    Contestant::new("**LeftBalancedTree**", || {
+                        LeftBalancedTree::new(photons).map_or(0, |tree| tree.len() as u64)
+                    }),
+                    Contestant::new("**HashGrid**", || {
+                        HashGrid::new(photons, cell).map_or(0, |grid| grid.len() as u64)
+                    }),
+                ],
+                arguments.patience(),
+            )
+        }));
+    }
+    Ok(Column {
+        title: "build, ms".to_owned(),
+        times,
+    })
+}
+
+pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String)>, Failure> {
+    let sizes: &[(&str, usize)] = &[
+        ("searches-100k", 100_000),
+        ("searches-1m", 1_000_000),
+        ("searches-5m", 5_000_000),
+    ];
+    let mut tables = Vec::new();
+    for &(name, count) in sizes {
+        if arguments.is_quick && count > 100_000 {
+            continue;
+        }
+        tables.push((name, of_size(count, arguments)?));
+        eprintln!("searched {count} photons");
+    }
+    Ok(tables)
+}
+
+fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
+    let photons = surface_photons(count);
+    let queries = pixel_queries(&photons, if arguments.is_quick { 4096 } else { 16_384 });
+    let payload: Payload = (0..count).map(|i| [1.0, (i % 7) as f32, 0.5]).collect();
+    let rows: Vec<[f32; 3]> = photons.iter().map(Vec3::to_array).collect();
+    let flat: Vec<f32> = rows.iter().flatten().copied().collect();
+    let dataset = MatrixDataset::new(flat, count, 3, MatrixLayout::RowMajorPoints)?;
+    let mut ours = PhotonTree::new(&photons)?;
+    let order = ours.renumber();
+    // The mean distance of the 50th and of the 200th nearest photon, and the radii that hold as
+    // many photons on average.
+    let mut scratch = NearestScratch::new();
+    let mut distances = [0.0_f32; 2];
+    let mut radii = [0.0_f32; 2];
+    for (place, k) in [50, 200].into_iter().enumerate() {
+        let mut total = 0.0;
+        for &q in &queries {
+            let found = ours.nearest(q, k, f32::INFINITY, &mut scratch);
+            total += found
+                .last()
+                .map_or(0.0, |n| f64::from(n.distance_squared).sqrt());
+        }
+        distances[place] = (total / queries.len() as f64) as f32;
+        let mut counted = 0_usize;
+        for &q in &queries {
+            ours.within(q, distances[place], |_, _| counted += 1);
+        }
+        let wanted = (k * queries.len()) as f32 / counted as f32;
+        radii[place] = distances[place] * wanted.sqrt();
+    }
+    let grid_of = |radius: f32| -> Result<(HashGrid, Payload), Failure> {
+        let mut grid = HashGrid::new(&photons, 2.0 * radius)?;
+        let order = grid.renumber();
+        let payload = reordered(&payload, &order);
+        Ok((grid, payload))
+    };
+    let field = Field {
+        ours_payload: reordered(&payload, &order),
+        ours,
+        classic: LeftBalancedTree::new(&photons)?,
+        grids: [grid_of(radii[0])?, grid_of(radii[1])?],
+        kiddo: ImmutableKdTree::new_from_slice(&rows).map_err(|error| format!("{error:?}"))?,
+        nanoflann: KdTree::new(3, &dataset, L2Simple, KdTreeParams::default())?,
+        payload,
+    };
+    let ask = |title, count, radius, grid| Question {
+        title,
+        count,
+        radius,
+        grid,
+    };
+    let questions = [
+        ask("50 nearest", Some(50), f32::INFINITY, 0),
+        ask("200 nearest", Some(200), f32::INFINITY, 0),
+        ask("50 nearest, limited", Some(50), 2.0 * distances[0], 0),
+        ask("200 nearest, limited", Some(200), 2.0 * distances[1], 0),
+        ask("all within r50", None, radii[0], 0),
+        ask("all within r200", None, radii[1], 1),
+    ];
+    let mut columns = vec![build_times(&photons, 2.0 * radii[0], arguments)?];
+    for question in questions {
+        columns.push(ask_all(&field, question, &queries, arguments)?);
+    }
+    Ok(table(&columns, queries.len()))
+}
+
+/// Asks every structure, after checking that all answers are the same.
+fn ask_all(
+    field: &Field<'_>,
+    question: Question,
+    queries: &[Vec3],
+    arguments: &Arguments,
+) -> Result<Column, Failure> {
+    let searchers = field.searchers(question);
+    let expected = searchers[0].1(queries);
+    for (name, search) in &searchers {
+        let found = search(queries);
+        // At equal distances, or at the radius to rounding, one photon may stand for another.
+        if (found / expected - 1.0).abs() > 1e-4 {
+            let title = question.title;
+            return Err(format!("{title}: {name} sums to {found} and not to {expected}").into());
+        }
+    }
+    let mut times = Vec::new();
+    for &threads in arguments.threads() {
+        let pool = pool(threads)?;
+        let contestants = searchers.iter().map(|(name, search)| {
+            let pool = &pool;
+            Contestant::new(name, move || {
+                let total: f64 = pool.install(|| queries.par_chunks(CHUNK).map(search).sum());
+                total as u64
+            })
+        });
+        times.push(medians(contestants.collect(), arguments.patience()));
+    }
+    Ok(Column {
+        title: question.title.to_owned(),
+        times,
+    })
+}
+
+/// Builds in milliseconds; searches in thousands a second and relative to kiddo on one thread.
+fn table(columns: &[Column], queries: usize) -> String {
+    let mut header = vec!["1 / 2 threads".to_owned()];
+    header.extend(columns.iter().map(|column| column.title.clone()));
+    let mut table = Table::new(&header);
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in columns.iter().flat_map(|column| &column.times[0]) {
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
+    for name in names {
+        let mut cells = vec![name.to_owned()];
+        for (place, column) in columns.iter().enumerate() {
+            let seconds_of = |times: &[Time], name: &str| {
+                times.iter().find(|time| time.0 == name).map(|time| time.1)
+            };
+            let all: Vec<f64> = column
+                .times
+                .iter()
+                .filter_map(|times| seconds_of(times, name))
+                .collect();
+            let Some(&first) = all.first() else {
+                cells.push(String::new());
+                continue;
+            };
+            let shown: Vec<String> = all
+                .iter()
+                .map(|seconds| {
+                    figures(if place == 0 {
+                        seconds * 1e3
+                    } else {
+                        queries as f64 / seconds / 1e3
+                    })
+                })
+                .collect();
+            let ratio = seconds_of(&column.times[0], "kiddo").map_or(1.0, |kiddo| kiddo / first);
+            cells.push(format!("{} (**{}**)", shown.join(" / "), figures(ratio)));
+        }
+        table.row(&cells);
+    }
+    table.finish()
+}
