@@ -1,5 +1,3 @@
-use std::f32::consts::FRAC_1_PI;
-
 use caustics_accel::Intersect;
 use caustics_geometry::Ray;
 use caustics_sampling::CounterRng;
@@ -29,20 +27,20 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         Self { world, intersect }
     }
 
-    /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²): exact for
+    /// Radiance that a receiver reflects towards the eye, in W/(sr m²): exact for
     /// point, spot and directional lights, from one random point on each area light.
     pub fn radiance(&self, receiver: &Receiver, rng: &mut CounterRng) -> Vec3 {
-        let mut irradiance = Vec3::ZERO;
+        let mut radiance = Vec3::ZERO;
         for light in self.world.lights() {
-            irradiance += self.arriving_from(receiver, light);
+            radiance += self.reflected_from(receiver, light);
         }
         for light in self.world.emitters() {
-            irradiance += self.arriving_from_area(receiver, light, rng);
+            radiance += self.reflected_from_area(receiver, light, rng);
         }
-        receiver.albedo * FRAC_1_PI * irradiance
+        radiance
     }
 
-    fn arriving_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
+    fn reflected_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
         let position = receiver.point.spawn.position;
         let (direction, distance, facing) = match *light {
             Light::Point { position: lamp, .. } | Light::Spot { position: lamp, .. } => {
@@ -68,10 +66,10 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if cosine <= 0.0 || facing == Vec3::ZERO || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        cosine * facing
+        receiver.reflectance(direction) * (cosine * facing)
     }
 
-    fn arriving_from_area(
+    fn reflected_from_area(
         &self,
         receiver: &Receiver,
         light: &AreaLight,
@@ -96,7 +94,8 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if leaving <= 0.0 || cosine <= 0.0 || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        light.radiance() * (light.area() * leaving * cosine / (distance * distance))
+        let arriving = light.area() * leaving * cosine / (distance * distance);
+        receiver.reflectance(direction) * (arriving * light.radiance())
     }
 
     /// The cosine of the incident light, 0 if it does not reach the side that is seen. The smooth

@@ -1,5 +1,3 @@
-use std::f32::consts::FRAC_1_PI;
-
 use caustics_accel::BoxTree;
 use caustics_geometry::Aabb;
 use caustics_trace::Photon;
@@ -175,17 +173,30 @@ impl FootprintGather {
     /// light that falls on the side of the normal.
     #[must_use]
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
-        let target = Target { position, normal };
         let mut sum = Vec3::ZERO;
+        self.for_each_lighting(position, normal, |density, kernel| {
+            sum += density.irradiance_at(kernel, normal);
+        });
+        sum
+    }
+
+    /// Calls `visit` with each footprint that lights a point, and its kernel there.
+    #[inline]
+    fn for_each_lighting(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        mut visit: impl FnMut(&Density, f32),
+    ) {
+        let target = Target { position, normal };
         self.tree.for_each_around(position, |place| {
             let piece = &self.pieces[place];
             let index = piece.footprint as usize;
             let kernel = self.footprints[index].kernel_at(piece, &target, self.kernel);
             if kernel > 0.0 {
-                sum += self.densities[index].irradiance_at(kernel, normal);
+                visit(&self.densities[index], kernel);
             }
         });
-        sum
     }
 
     /// Irradiance as in [`irradiance`](Self::irradiance), averaged over a pixel whose edges on the
@@ -196,13 +207,27 @@ impl FootprintGather {
     /// no photon landed.
     #[must_use]
     pub fn irradiance_over(&self, position: Vec3, normal: Vec3, pixel: [Vec3; 2]) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        self.for_each_over(position, normal, pixel, |blurred| {
+            sum += blurred.irradiance(position, normal);
+        });
+        sum
+    }
+
+    /// Calls `visit` with each footprint, blurred by a pixel, that lights a point.
+    fn for_each_over(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        pixel: [Vec3; 2],
+        mut visit: impl FnMut(&Density),
+    ) {
         let [a, b] = pixel;
         let reach = self.blur_reach * (a.length_squared() + b.length_squared()).sqrt();
         let query = Aabb {
             min: position - reach,
             max: position + reach,
         };
-        let mut sum = Vec3::ZERO;
         self.tree.for_each_overlapping(&query, |place| {
             let piece = &self.pieces[place];
             let index = piece.footprint as usize;
@@ -210,25 +235,38 @@ impl FootprintGather {
                 && let Some(blurred) = self.densities[index].blurred(&pixel)
                 && blurred.gate().admits(&blurred, position, normal)
             {
-                sum += blurred.irradiance(position, normal);
+                visit(&blurred);
             }
         });
-        sum
     }
 
-    /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²).
+    /// Radiance that a receiver reflects towards the eye, in W/(sr m²): each photon's part by its own
+    /// direction.
     #[must_use]
     pub fn radiance(&self, receiver: &Receiver) -> Vec3 {
-        let irradiance = self.irradiance(receiver.point.spawn.position, receiver.normal);
-        receiver.albedo * FRAC_1_PI * irradiance
+        let (position, normal) = (receiver.point.spawn.position, receiver.normal);
+        if receiver.brdf.is_lambertian() {
+            return receiver.reflectance(normal) * self.irradiance(position, normal);
+        }
+        let mut sum = Vec3::ZERO;
+        self.for_each_lighting(position, normal, |density, kernel| {
+            let reflectance = receiver.reflectance(-density.incoming);
+            sum += reflectance * density.irradiance_at(kernel, normal);
+        });
+        sum
     }
 
     /// Radiance as in [`radiance`](Self::radiance), averaged over a pixel whose edges on the
     /// receiver are `pixel`, in metres.
     #[must_use]
     pub fn radiance_over(&self, receiver: &Receiver, pixel: [Vec3; 2]) -> Vec3 {
-        let position = receiver.point.spawn.position;
-        receiver.albedo * FRAC_1_PI * self.irradiance_over(position, receiver.normal, pixel)
+        let (position, normal) = (receiver.point.spawn.position, receiver.normal);
+        let mut sum = Vec3::ZERO;
+        self.for_each_over(position, normal, pixel, |blurred| {
+            let reflectance = receiver.reflectance(-blurred.incoming);
+            sum += reflectance * blurred.irradiance(position, normal);
+        });
+        sum
     }
 
     /// What became of the photons.

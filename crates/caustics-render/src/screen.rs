@@ -55,6 +55,15 @@ impl Screen {
         -view.dot(normal)
     }
 
+    /// The unit direction from a point to the eye.
+    pub(crate) fn direction_to_eye(&self, point: Vec3) -> Vec3 {
+        if self.is_perspective {
+            (self.eye - point).normalize_or_zero()
+        } else {
+            -self.forward
+        }
+    }
+
     /// The pixel coordinates of a point in front of the camera; `None` behind it.
     pub(crate) fn project(&self, point: Vec3) -> Option<Vec2> {
         let relative = point - self.eye;

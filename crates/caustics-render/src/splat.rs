@@ -52,10 +52,9 @@ pub fn splat(
     options: &FootprintOptions,
 ) -> Result<(Image, SplatStats), RenderError> {
     options.validate()?;
-    let mut levels: Vec<Level> = vec![Level::finest(buffer)];
-    while levels.len() < LEVELS {
-        let next = levels[levels.len() - 1].coarser();
-        levels.push(next);
+    let mut passes = vec![Pass::new(Level::finest(buffer, false))];
+    if buffer.is_glossy() {
+        passes.push(Pass::new(Level::finest(buffer, true)));
     }
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
@@ -68,17 +67,58 @@ pub fn splat(
                 Prepared::Invalid => stats.invalid += 1,
             }
         }
-        for (number, level) in levels.iter_mut().enumerate() {
-            level.accumulate(&prepared, number);
+        for pass in &mut passes {
+            pass.accumulate(&prepared, &buffer.screen);
         }
     }
-    while let Some(coarse) = levels.pop() {
-        match levels.last_mut() {
-            Some(fine) => fine.add_coarser(&coarse),
-            None => return Ok((coarse.radiance()?, stats)),
+    let mut image = Image::new(buffer.width(), buffer.height())?;
+    for pass in passes {
+        pass.add_to(&mut image);
+    }
+    Ok((image, stats))
+}
+
+/// The texels that reflect in one way, at all levels that serve.
+struct Pass<'a> {
+    /// The finest first; at least one.
+    levels: Vec<Level<'a>>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(finest: Level<'a>) -> Self {
+        let coarser = finest.coarsest(LEVELS as u8 - 1);
+        let mut levels = vec![finest];
+        for level in 0..usize::from(coarser) {
+            levels.push(levels[level].coarser());
+        }
+        Self { levels }
+    }
+
+    fn accumulate(&mut self, prepared: &[Prepared], screen: &Screen) {
+        let coarsest = self.levels.len() as u8 - 1;
+        let refined;
+        let prepared = if usize::from(coarsest) + 1 < LEVELS {
+            refined = prepared
+                .iter()
+                .map(|one| one.refined(coarsest, screen))
+                .collect::<Vec<_>>();
+            &refined
+        } else {
+            prepared
+        };
+        for (number, level) in self.levels.iter_mut().enumerate() {
+            level.accumulate(prepared, number);
         }
     }
-    Ok((Image::new(buffer.width(), buffer.height())?, stats))
+
+    fn add_to(mut self, image: &mut Image) {
+        while let Some(coarse) = self.levels.pop() {
+            match self.levels.last_mut() {
+                Some(fine) => fine.add_coarser(&coarse),
+                None => coarse.add_to(image),
+            }
+        }
+    }
 }
 
 /// A photon made ready for one level of the picture.
@@ -99,11 +139,22 @@ pub(crate) struct Splat {
     pub(crate) rows: [u16; 2],
 }
 
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Prepared {
     Splat(Splat),
     Outside,
     TurnedAway,
     Invalid,
+}
+
+impl Prepared {
+    /// The same, on no coarser level than `coarsest`.
+    fn refined(&self, coarsest: u8, screen: &Screen) -> Self {
+        match self {
+            Self::Splat(splat) => Self::Splat(splat.refined(coarsest, screen)),
+            other => *other,
+        }
+    }
 }
 
 fn prepare(photons: &[Photon], screen: &Screen, options: &FootprintOptions) -> Vec<Prepared> {
@@ -173,6 +224,24 @@ impl Splat {
             self.step_x *= stride;
             self.step_y *= stride;
         }
+    }
+
+    fn refined(&self, coarsest: u8, screen: &Screen) -> Self {
+        let mut finer = *self;
+        let halvings = self.level.saturating_sub(coarsest);
+        let factor = STRIDE.pow(u32::from(halvings));
+        finer.level -= halvings;
+        finer.center *= factor as f32;
+        finer.step_x /= factor as f32;
+        finer.step_y /= factor as f32;
+        let stride = STRIDE.pow(u32::from(finer.level));
+        let widen = |range: [u16; 2], size: u32| {
+            let size = size.div_ceil(stride);
+            range.map(|end| (u32::from(end) * factor).min(size) as u16)
+        };
+        finer.columns = widen(self.columns, screen.width);
+        finer.rows = widen(self.rows, screen.height);
+        finer
     }
 
     /// The pixels of the level whose middles may lie in the footprint.

@@ -4,33 +4,50 @@ use caustics_filter::Image;
 use glam::{Vec2, Vec3};
 
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
-use crate::error::RenderError;
 use crate::gbuffer::{GBuffer, Texel};
-use crate::splat::{Prepared, STRIDE};
+use crate::gloss::GlossyTexels;
+use crate::splat::{Prepared, STRIDE, Splat};
 
 /// Rows of one task.
 const BAND: usize = 16;
 
-/// The irradiance of a picture's texels at one resolution.
-pub(crate) struct Level {
+/// What a level's texels are lit as.
+enum Reflection {
+    /// Lambertian ones take irradiance; the picture makes radiance of it in the end.
+    Lambertian,
+    /// Glossy ones take radiance towards the eye.
+    Glossy(GlossyTexels),
+}
+
+/// The irradiance of a picture's texels at one resolution, or of glossy ones the radiance.
+pub(crate) struct Level<'a> {
+    buffer: &'a GBuffer,
+    reflection: Reflection,
     width: usize,
     height: usize,
     texels: Vec<Option<Texel>>,
     columns: TexelColumns,
-    irradiance: Columns,
+    light: Columns,
     extras: Vec<(u32, Texel)>,
-    extra_irradiance: Vec<Vec3>,
+    extra_light: Vec<Vec3>,
     /// For each band, where its extras start; one more than there are bands.
     extra_starts: Vec<usize>,
 }
 
-impl Level {
-    pub(crate) fn new(
-        width: usize,
-        height: usize,
+impl<'a> Level<'a> {
+    fn new(
+        buffer: &'a GBuffer,
+        [width, height]: [usize; 2],
         texels: Vec<Option<Texel>>,
         extras: Vec<(u32, Texel)>,
+        is_glossy: bool,
     ) -> Self {
+        let (reflection, columns) = if is_glossy {
+            let glossy = GlossyTexels::new(&texels, &extras, buffer);
+            (Reflection::Glossy(glossy), TexelColumns::default())
+        } else {
+            (Reflection::Lambertian, TexelColumns::new(&texels))
+        };
         let bands = height.div_ceil(BAND);
         let extra_starts = (0..=bands)
             .map(|band| {
@@ -38,24 +55,41 @@ impl Level {
             })
             .collect();
         Self {
+            buffer,
+            reflection,
             width,
             height,
-            irradiance: Columns::zero(texels.len()),
-            columns: TexelColumns::new(&texels),
+            light: Columns::zero(texels.len()),
+            columns,
             texels,
-            extra_irradiance: vec![Vec3::ZERO; extras.len()],
+            extra_light: vec![Vec3::ZERO; extras.len()],
             extras,
             extra_starts,
         }
     }
 
-    pub(crate) fn finest(buffer: &GBuffer) -> Self {
-        Self::new(
-            buffer.width() as usize,
-            buffer.height() as usize,
-            buffer.texels.clone(),
-            buffer.extras.clone(),
-        )
+    /// The pixels themselves, as far as their texels are Lambertian, or glossy.
+    pub(crate) fn finest(buffer: &'a GBuffer, is_glossy: bool) -> Self {
+        let (texels, extras) = if buffer.is_glossy() {
+            let is_wanted = |texel: &Texel| buffer.brdf(texel).is_lambertian() != is_glossy;
+            let (texels, extras) = (buffer.texels.iter(), buffer.extras.iter());
+            (
+                texels.map(|texel| texel.filter(is_wanted)).collect(),
+                extras.filter(|(_, it)| is_wanted(it)).copied().collect(),
+            )
+        } else {
+            (buffer.texels.clone(), buffer.extras.clone())
+        };
+        let size = [buffer.width(), buffer.height()].map(|size| size as usize);
+        Self::new(buffer, size, texels, extras, is_glossy)
+    }
+
+    /// Up to which coarser level, at most `limit`, light may be drawn and interpolated from.
+    pub(crate) fn coarsest(&self, limit: u8) -> u8 {
+        match &self.reflection {
+            Reflection::Lambertian => limit,
+            Reflection::Glossy(texels) => texels.halvings(self.width, limit),
+        }
     }
 
     /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle,
@@ -88,7 +122,8 @@ impl Level {
                 })
             })
             .collect();
-        Self::new(width, height, texels, Vec::new())
+        let is_glossy = matches!(self.reflection, Reflection::Glossy(_));
+        Self::new(self.buffer, [width, height], texels, Vec::new(), is_glossy)
     }
 
     /// Adds the splats of this level.
@@ -107,19 +142,21 @@ impl Level {
                 }
             }
         }
-        let mut extra_rest = self.extra_irradiance.as_mut_slice();
+        let mut extra_rest = self.extra_light.as_mut_slice();
         let mut tasks = Vec::with_capacity(bands);
-        for (number, irradiance) in self.irradiance.chunks_mut(BAND * self.width).enumerate() {
+        for (number, light) in self.light.chunks_mut(BAND * self.width).enumerate() {
             let extras = self.extra_starts[number]..self.extra_starts[number + 1];
-            let (extra_irradiance, rest) = extra_rest.split_at_mut(extras.len());
+            let (extra_light, rest) = extra_rest.split_at_mut(extras.len());
             extra_rest = rest;
             tasks.push(BandTask {
                 first_row: number * BAND,
                 width: self.width,
+                reflection: &self.reflection,
                 columns: &self.columns,
-                irradiance,
+                light,
+                first_extra: extras.start,
                 extras: &self.extras[extras],
-                extra_irradiance,
+                extra_light,
                 splats: &lists[number],
             });
         }
@@ -149,25 +186,25 @@ impl Level {
         }
         for (pixel, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                let sum = self.irradiance.get(pixel) + coarse.interpolate(place(pixel), texel);
-                self.irradiance.set(pixel, sum);
+                let sum = self.light.get(pixel) + coarse.interpolate(place(pixel), texel);
+                self.light.set(pixel, sum);
             }
         }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&mut self.extra_irradiance) {
-            *irradiance += coarse.interpolate(place(*pixel as usize), texel);
+        for ((pixel, texel), light) in self.extras.iter().zip(&mut self.extra_light) {
+            *light += coarse.interpolate(place(*pixel as usize), texel);
         }
     }
 
     fn is_dark(&self) -> bool {
-        self.irradiance
+        self.light
             .x
             .iter()
-            .chain(&self.irradiance.y)
-            .chain(&self.irradiance.z)
+            .chain(&self.light.y)
+            .chain(&self.light.z)
             .all(|&it| it == 0.0)
     }
 
-    /// The irradiance between the middles of pixels, from those that see the same surface.
+    /// The light between the middles of pixels, from those that see the same surface.
     fn interpolate(&self, at: Vec2, texel: &Texel) -> Vec3 {
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
         // The four around the point; where none sees the surface, the next ones out.
@@ -189,7 +226,7 @@ impl Level {
                     }
                     let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
                     let weight = tent.x * tent.y;
-                    sum += weight * self.irradiance.get(index);
+                    sum += weight * self.light.get(index);
                     weights += weight;
                 }
             }
@@ -200,19 +237,27 @@ impl Level {
         Vec3::ZERO
     }
 
-    pub(crate) fn radiance(&self) -> Result<Image, RenderError> {
-        let mut image = Image::new(self.width as u32, self.height as u32)?;
+    /// Adds the radiance of all texels to a picture.
+    pub(crate) fn add_to(&self, image: &mut Image) {
         let pixels = image.pixels_mut();
+        let mut add = |pixel: usize, texel: &Texel, light: Vec3| {
+            let reflected = match self.reflection {
+                Reflection::Lambertian => {
+                    FRAC_1_PI * (self.buffer.brdf(texel).base() * texel.coverage)
+                }
+                Reflection::Glossy(_) => Vec3::splat(texel.coverage),
+            };
+            let sum = Vec3::from(pixels[pixel]) + reflected * light;
+            pixels[pixel] = sum.to_array();
+        };
         for (index, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance.get(index)).to_array();
+                add(index, texel, self.light.get(index));
             }
         }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&self.extra_irradiance) {
-            let pixel = &mut pixels[*pixel as usize];
-            *pixel = (Vec3::from(*pixel) + FRAC_1_PI * texel.albedo * *irradiance).to_array();
+        for ((pixel, texel), light) in self.extras.iter().zip(&self.extra_light) {
+            add(*pixel as usize, texel, *light);
         }
-        Ok(image)
     }
 }
 
@@ -220,17 +265,19 @@ impl Level {
 struct BandTask<'a> {
     first_row: usize,
     width: usize,
+    reflection: &'a Reflection,
     columns: &'a TexelColumns,
     /// From the band's first row on.
-    irradiance: ColumnsMut<'a>,
+    light: ColumnsMut<'a>,
+    first_extra: usize,
     extras: &'a [(u32, Texel)],
-    extra_irradiance: &'a mut [Vec3],
+    extra_light: &'a mut [Vec3],
     splats: &'a [u32],
 }
 
 impl BandTask<'_> {
     fn run(mut self, prepared: &[Prepared]) {
-        let rows = self.irradiance.x.len() / self.width;
+        let rows = self.light.x.len() / self.width;
         for &index in self.splats {
             let Prepared::Splat(splat) = &prepared[index as usize] else {
                 continue;
@@ -240,14 +287,17 @@ impl BandTask<'_> {
             for row in first..last {
                 let span = splat.span(row);
                 let start = (row - self.first_row) * self.width;
-                self.columns.light(
-                    &splat.density,
-                    &splat.gate,
-                    row * self.width + span.start,
-                    span.len(),
-                    &mut self.irradiance,
-                    start + span.start,
-                );
+                let (from, to) = (row * self.width + span.start, start + span.start);
+                let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
+                match self.reflection {
+                    Reflection::Lambertian => {
+                        self.columns
+                            .light(density, gate, from, span.len(), light, to);
+                    }
+                    Reflection::Glossy(texels) => {
+                        texels.light(density, gate, from, span.len(), light, to);
+                    }
+                }
             }
             if !self.extras.is_empty() && first < last {
                 let low = (first * self.width) as u32;
@@ -260,9 +310,20 @@ impl BandTask<'_> {
                     }
                     let column = pixel % self.width as u32;
                     if (columns[0]..columns[1]).contains(&column) {
-                        self.extra_irradiance[begin + offset] += splat.irradiance(texel);
+                        self.extra_light[begin + offset] +=
+                            self.extra(splat, begin + offset, texel);
                     }
                 }
+            }
+        }
+    }
+
+    /// What a splat adds to an extra texel of the band.
+    fn extra(&self, splat: &Splat, extra: usize, texel: &Texel) -> Vec3 {
+        match self.reflection {
+            Reflection::Lambertian => splat.irradiance(texel),
+            Reflection::Glossy(texels) => {
+                texels.extra_radiance(self.first_extra + extra, &splat.density, &splat.gate)
             }
         }
     }
