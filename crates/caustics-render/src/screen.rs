@@ -83,6 +83,20 @@ impl Screen {
         Some(self.center + scale * pixel)
     }
 
+    /// The point of a plane, through `point` with unit `normal`, at pixel coordinates; `None` where
+    /// it is not in front of the camera.
+    pub(crate) fn on_plane(&self, pixel: Vec2, point: Vec3, normal: Vec3) -> Option<Vec3> {
+        let offset = pixel - self.center;
+        let step = offset.x * self.step_x + offset.y * self.step_y;
+        let (origin, direction) = if self.is_perspective {
+            (self.eye, self.forward + step)
+        } else {
+            (self.eye + step, self.forward)
+        };
+        let distance = (point - origin).dot(normal) / direction.dot(normal);
+        (distance > 0.0 && distance.is_finite()).then(|| origin + distance * direction)
+    }
+
     /// How the point of a plane that a pixel sees moves with the pixel's two coordinates, in
     /// metres a pixel: the edges of the pixel's own footprint at `point` on a plane with unit
     /// `normal`. `None` where the plane is seen edge-on or from behind the camera.
@@ -145,6 +159,11 @@ mod tests {
                 ray.at(-ray.origin.dot(normal) / ray.direction.dot(normal))
             };
             let (x, y) = (350.0, 260.0);
+            let expected = on_plane(x, y);
+            let found = screen
+                .on_plane(Vec2::new(x, y), Vec3::ZERO, normal)
+                .unwrap();
+            assert!(found.abs_diff_eq(expected, 1e-4), "{found} {expected}");
             let [along_x, along_y] = screen.pixel_axes(on_plane(x, y), normal).unwrap();
             let central_x = 0.5 * (on_plane(x + 1.0, y) - on_plane(x - 1.0, y));
             let central_y = 0.5 * (on_plane(x, y + 1.0) - on_plane(x, y - 1.0));

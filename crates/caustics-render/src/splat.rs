@@ -7,7 +7,7 @@ use crate::error::RenderError;
 use crate::footprint::{Density, FootprintOptions, Gate};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::screen::Screen;
-use crate::splat_level::Level;
+use crate::splat_level::{Level, margin};
 
 /// Photons that are prepared at a time, to bound the memory.
 const BATCH: usize = 1 << 17;
@@ -229,15 +229,22 @@ impl Splat {
     fn refined(&self, coarsest: u8, screen: &Screen) -> Self {
         let mut finer = *self;
         let halvings = self.level.saturating_sub(coarsest);
+        if halvings == 0 {
+            return finer;
+        }
         let factor = STRIDE.pow(u32::from(halvings));
         finer.level -= halvings;
-        finer.center *= factor as f32;
+        let depth = u32::from(finer.level);
+        let (before, after) = (margin(u32::from(self.level)), margin(depth));
+        finer.center = (self.center - before as f32) * factor as f32 + after as f32;
         finer.step_x /= factor as f32;
         finer.step_y /= factor as f32;
-        let stride = STRIDE.pow(u32::from(finer.level));
-        let widen = |range: [u16; 2], size: u32| {
-            let size = size.div_ceil(stride);
-            range.map(|end| (u32::from(end) * factor).min(size) as u16)
+        let widen = |[first, last]: [u16; 2], size: u32| {
+            let size = size.div_ceil(STRIDE.pow(depth)) as usize + 2 * after;
+            // What lies in the margin there may lie in that of any level.
+            let first = usize::from(first).saturating_sub(before) * factor as usize;
+            let last = usize::from(last) * factor as usize + after;
+            [first.min(size) as u16, last.min(size) as u16]
         };
         finer.columns = widen(self.columns, screen.width);
         finer.rows = widen(self.rows, screen.height);
@@ -246,15 +253,17 @@ impl Splat {
 
     /// The pixels of the level whose middles may lie in the footprint.
     fn place(&mut self, bounds: &Bounds, screen: &Screen) {
-        let stride = STRIDE.pow(u32::from(self.level));
+        let depth = u32::from(self.level);
+        let (stride, margin) = (STRIDE.pow(depth), margin(depth) as f32);
         let range = |low: f32, high: f32, size: u32| {
-            let size = size.div_ceil(stride);
-            let first = (low / stride as f32 - 1.0).floor().max(0.0) as u32;
-            let last = (high / stride as f32 + 1.0).ceil().max(0.0) as u32;
-            [first.min(size) as u16, last.min(size) as u16]
+            let size = size.div_ceil(stride) as f32 + 2.0 * margin;
+            let first = (low / stride as f32 - 1.0).floor() + margin;
+            let last = (high / stride as f32 + 1.0).ceil() + margin;
+            [first, last].map(|end| end.clamp(0.0, size) as u16)
         };
         self.columns = range(bounds.low.x, bounds.high.x, screen.width);
         self.rows = range(bounds.low.y, bounds.high.y, screen.height);
+        self.center += margin;
     }
 
     /// The pixels of a row whose middles lie in the footprint.

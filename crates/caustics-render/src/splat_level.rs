@@ -11,6 +11,14 @@ use crate::splat::{Prepared, STRIDE, Splat};
 /// Rows of one task.
 const BAND: usize = 16;
 
+/// Pixels that a coarser level has beyond the picture, on every side.
+const MARGIN: usize = 1;
+
+/// Pixels that a level has beyond the picture, on every side.
+pub(crate) fn margin(depth: u32) -> usize {
+    if depth == 0 { 0 } else { MARGIN }
+}
+
 /// What a level's texels are lit as.
 enum Reflection {
     /// Lambertian ones take irradiance; the picture makes radiance of it in the end.
@@ -23,8 +31,11 @@ enum Reflection {
 pub(crate) struct Level<'a> {
     buffer: &'a GBuffer,
     reflection: Reflection,
+    /// With the margin.
     width: usize,
     height: usize,
+    /// How often the picture was halved.
+    depth: u32,
     texels: Vec<Option<Texel>>,
     columns: TexelColumns,
     light: Columns,
@@ -38,6 +49,7 @@ impl<'a> Level<'a> {
     fn new(
         buffer: &'a GBuffer,
         [width, height]: [usize; 2],
+        depth: u32,
         texels: Vec<Option<Texel>>,
         extras: Vec<(u32, Texel)>,
         is_glossy: bool,
@@ -59,6 +71,7 @@ impl<'a> Level<'a> {
             reflection,
             width,
             height,
+            depth,
             light: Columns::zero(texels.len()),
             columns,
             texels,
@@ -81,7 +94,7 @@ impl<'a> Level<'a> {
             (buffer.texels.clone(), buffer.extras.clone())
         };
         let size = [buffer.width(), buffer.height()].map(|size| size as usize);
-        Self::new(buffer, size, texels, extras, is_glossy)
+        Self::new(buffer, size, 0, texels, extras, is_glossy)
     }
 
     /// Up to which coarser level, at most `limit`, light may be drawn and interpolated from.
@@ -92,38 +105,83 @@ impl<'a> Level<'a> {
         }
     }
 
-    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle,
-    /// moved to the middle of those on the same surface: what is found there is taken to be the
-    /// light in the block's middle.
+    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle.
+    ///
+    /// Its texels lie where the block's middle sees their plane, also where only a part of the
+    /// block sees it, or where the block ends outside the picture. A margin of one pixel around
+    /// continues what is seen at the border, so that the picture's outermost pixels have something
+    /// to be interpolated from on either side.
     pub(crate) fn coarser(&self) -> Self {
         let stride = STRIDE as usize;
-        let (width, height) = (self.width.div_ceil(stride), self.height.div_ceil(stride));
-        let texels = (0..width * height)
+        let size @ [width, height] = self.inner().map(|size| size.div_ceil(stride));
+        let blocks: Vec<Option<Texel>> = (0..width * height)
+            .map(|index| self.block(index % width, index / width))
+            .collect();
+        let (depth, padded) = (self.depth + 1, size.map(|size| size + 2 * MARGIN));
+        let texels = (0..padded[0] * padded[1])
             .map(|index| {
-                let (x0, y0) = (index % width * stride, index / width * stride);
-                let middle = (stride as f32 - 1.0) * 0.5;
-                let inside = (0..stride * stride).filter_map(|it| {
-                    let (dx, dy) = (it % stride, it / stride);
-                    let (x, y) = (x0 + dx, y0 + dy);
-                    let texel = (x < self.width && y < self.height)
-                        .then(|| self.texels[y * self.width + x])
-                        .flatten()?;
-                    let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
-                    Some((off, texel))
-                });
-                let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
-                let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
-                let (sum, count) = alike.fold((Vec3::ZERO, 0.0), |(sum, count), (_, texel)| {
-                    (sum + texel.position, count + 1.0)
-                });
-                Some(Texel {
-                    position: sum / count,
-                    ..nearest
-                })
+                let (x, y) = (index % padded[0], index / padded[0]);
+                let nearest = |at: usize, size: usize| at.clamp(MARGIN, size) - MARGIN;
+                let inside = (nearest(x, width), nearest(y, height));
+                let texel = blocks[inside.1 * width + inside.0]?;
+                if (inside.0 + MARGIN, inside.1 + MARGIN) == (x, y) {
+                    return Some(texel);
+                }
+                let middle = Vec2::new(x as f32, y as f32) + 0.5 - MARGIN as f32;
+                self.moved(texel, middle, depth)
             })
             .collect();
         let is_glossy = matches!(self.reflection, Reflection::Glossy(_));
-        Self::new(self.buffer, [width, height], texels, Vec::new(), is_glossy)
+        Self::new(self.buffer, padded, depth, texels, Vec::new(), is_glossy)
+    }
+
+    /// The texel of a block of the next level.
+    fn block(&self, x: usize, y: usize) -> Option<Texel> {
+        let stride = STRIDE as usize;
+        let [width, height] = self.inner();
+        let middle = (stride as f32 - 1.0) * 0.5;
+        let inside = (0..stride * stride).filter_map(|it| {
+            let (dx, dy) = (it % stride, it / stride);
+            let (x, y) = (x * stride + dx, y * stride + dy);
+            let index = (y + self.margin()) * self.width + x + self.margin();
+            let texel = (x < width && y < height)
+                .then(|| self.texels[index])
+                .flatten()?;
+            let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
+            Some((off, texel))
+        });
+        let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
+        let (sum, count) = alike.fold((Vec3::ZERO, 0), |(sum, count), (_, texel)| {
+            (sum + texel.position, count + 1)
+        });
+        let middle = Texel {
+            position: sum / count as f32,
+            ..nearest
+        };
+        if count == stride * stride {
+            return Some(middle);
+        }
+        let at = Vec2::new(x as f32, y as f32) + 0.5;
+        self.moved(middle, at, self.depth + 1).or(Some(middle))
+    }
+
+    /// A texel moved in its plane to where the pixel coordinates of a level see it.
+    fn moved(&self, texel: Texel, at: Vec2, depth: u32) -> Option<Texel> {
+        let pixel = at * STRIDE.pow(depth) as f32;
+        let screen = &self.buffer.screen;
+        let position = screen.on_plane(pixel, texel.position, texel.normal)?;
+        Some(Texel { position, ..texel })
+    }
+
+    /// Pixels around those of the picture.
+    fn margin(&self) -> usize {
+        margin(self.depth)
+    }
+
+    /// Width and height without the margin.
+    fn inner(&self) -> [usize; 2] {
+        [self.width, self.height].map(|size| size - 2 * self.margin())
     }
 
     /// Adds the splats of this level.
@@ -176,10 +234,10 @@ impl<'a> Level<'a> {
 
     pub(crate) fn add_coarser(&mut self, coarse: &Self) {
         let stride = STRIDE as f32;
-        let width = self.width;
+        let (width, margin) = (self.width, self.margin() as f32);
         let place = |pixel: usize| {
             let (x, y) = (pixel % width, pixel / width);
-            (Vec2::new(x as f32, y as f32) + 0.5) / stride - 0.5
+            (Vec2::new(x as f32, y as f32) + 0.5 - margin) / stride - 0.5 + MARGIN as f32
         };
         if coarse.is_dark() {
             return;
