@@ -171,28 +171,45 @@ impl FootprintGather {
 
     /// Irradiance at a point of a surface with unit `normal`, in W/m² for each channel, by the
     /// light that falls on the side of the normal.
+    ///
+    /// Whatever object the point belongs to: it may share light with a parallel surface that is
+    /// closer to it than a part of a footprint's width. [`irradiance_on`](Self::irradiance_on) knows
+    /// better.
     #[must_use]
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
+        self.irradiance_at(&Target {
+            position,
+            normal,
+            object: None,
+        })
+    }
+
+    /// Irradiance as in [`irradiance`](Self::irradiance), at a point of the object with this index
+    /// among the world's.
+    #[must_use]
+    pub fn irradiance_on(&self, object: u32, position: Vec3, normal: Vec3) -> Vec3 {
+        self.irradiance_at(&Target {
+            position,
+            normal,
+            object: Some(object),
+        })
+    }
+
+    fn irradiance_at(&self, target: &Target) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        self.for_each_lighting(position, normal, |density, kernel| {
-            sum += density.irradiance_at(kernel, normal);
+        self.for_each_lighting(target, |density, kernel| {
+            sum += density.irradiance_at(kernel, target.normal);
         });
         sum
     }
 
     /// Calls `visit` with each footprint that lights a point, and its kernel there.
     #[inline]
-    fn for_each_lighting(
-        &self,
-        position: Vec3,
-        normal: Vec3,
-        mut visit: impl FnMut(&Density, f32),
-    ) {
-        let target = Target { position, normal };
-        self.tree.for_each_around(position, |place| {
+    fn for_each_lighting(&self, target: &Target, mut visit: impl FnMut(&Density, f32)) {
+        self.tree.for_each_around(target.position, |place| {
             let piece = &self.pieces[place];
             let index = piece.footprint as usize;
-            let kernel = self.footprints[index].kernel_at(piece, &target, self.kernel);
+            let kernel = self.footprints[index].kernel_at(piece, target, self.kernel);
             if kernel > 0.0 {
                 visit(&self.densities[index], kernel);
             }
@@ -207,21 +224,25 @@ impl FootprintGather {
     /// no photon landed.
     #[must_use]
     pub fn irradiance_over(&self, position: Vec3, normal: Vec3, pixel: [Vec3; 2]) -> Vec3 {
+        let target = Target {
+            position,
+            normal,
+            object: None,
+        };
         let mut sum = Vec3::ZERO;
-        self.for_each_over(position, normal, pixel, |blurred| {
+        self.for_each_over(&target, pixel, |blurred| {
             sum += blurred.irradiance(position, normal);
         });
         sum
     }
 
     /// Calls `visit` with each footprint, blurred by a pixel, that lights a point.
-    fn for_each_over(
-        &self,
-        position: Vec3,
-        normal: Vec3,
-        pixel: [Vec3; 2],
-        mut visit: impl FnMut(&Density),
-    ) {
+    fn for_each_over(&self, target: &Target, pixel: [Vec3; 2], mut visit: impl FnMut(&Density)) {
+        let Target {
+            position,
+            normal,
+            object,
+        } = *target;
         let [a, b] = pixel;
         let reach = self.blur_reach * (a.length_squared() + b.length_squared()).sqrt();
         let query = Aabb {
@@ -233,7 +254,7 @@ impl FootprintGather {
             let index = piece.footprint as usize;
             if self.footprints[index].is_in(piece, position)
                 && let Some(blurred) = self.densities[index].blurred(&pixel)
-                && blurred.gate().admits(&blurred, position, normal)
+                && blurred.gate().admits(&blurred, position, normal, object)
             {
                 visit(&blurred);
             }
@@ -244,14 +265,14 @@ impl FootprintGather {
     /// direction.
     #[must_use]
     pub fn radiance(&self, receiver: &Receiver) -> Vec3 {
-        let (position, normal) = (receiver.point.spawn.position, receiver.normal);
+        let target = Target::of(receiver);
         if receiver.brdf.is_lambertian() {
-            return receiver.reflectance(normal) * self.irradiance(position, normal);
+            return receiver.reflectance(target.normal) * self.irradiance_at(&target);
         }
         let mut sum = Vec3::ZERO;
-        self.for_each_lighting(position, normal, |density, kernel| {
+        self.for_each_lighting(&target, |density, kernel| {
             let reflectance = receiver.reflectance(-density.incoming);
-            sum += reflectance * density.irradiance_at(kernel, normal);
+            sum += reflectance * density.irradiance_at(kernel, target.normal);
         });
         sum
     }
@@ -260,11 +281,11 @@ impl FootprintGather {
     /// receiver are `pixel`, in metres.
     #[must_use]
     pub fn radiance_over(&self, receiver: &Receiver, pixel: [Vec3; 2]) -> Vec3 {
-        let (position, normal) = (receiver.point.spawn.position, receiver.normal);
+        let target = Target::of(receiver);
         let mut sum = Vec3::ZERO;
-        self.for_each_over(position, normal, pixel, |blurred| {
+        self.for_each_over(&target, pixel, |blurred| {
             let reflectance = receiver.reflectance(-blurred.incoming);
-            sum += reflectance * blurred.irradiance(position, normal);
+            sum += reflectance * blurred.irradiance(target.position, target.normal);
         });
         sum
     }
@@ -596,11 +617,11 @@ mod tests {
                     let (position, normal) = (photon.position + aside, photon.normal);
                     let (mut alone, mut blurred) = (Vec3::ZERO, Vec3::ZERO);
                     for density in &gather.densities {
-                        if density.gate().admits(density, position, normal) {
+                        if density.gate().admits(density, position, normal, None) {
                             alone += density.irradiance(position, normal);
                         }
                         let density = density.blurred(&pixel).unwrap();
-                        if density.gate().admits(&density, position, normal) {
+                        if density.gate().admits(&density, position, normal, None) {
                             blurred += density.irradiance(position, normal);
                         }
                     }

@@ -21,6 +21,7 @@ struct GlossyTexel {
     serving_normal: Vec3,
     to_eye: Vec3,
     brdf: Brdf,
+    object: u32,
 }
 
 impl GlossyTexel {
@@ -32,13 +33,14 @@ impl GlossyTexel {
             serving_normal: serving_normal(texel.normal, texel.shading_normal, to_eye),
             to_eye,
             brdf: buffer.brdf(texel),
+            object: texel.object,
         }
     }
 
     /// What a footprint adds to the radiance towards the eye.
     #[inline]
     fn radiance(&self, density: &Density, gate: &Gate) -> Vec3 {
-        if !gate.admits(density, self.position, self.normal) {
+        if !gate.admits(density, self.position, self.normal, Some(self.object)) {
             return Vec3::ZERO;
         }
         let irradiance = density.irradiance(self.position, self.normal);
@@ -79,10 +81,7 @@ impl GlossyTexels {
     ) {
         for (index, texel) in (target..).zip(&self.texels[first..first + count]) {
             if let Some(texel) = texel {
-                let [red, green, blue] = texel.radiance(density, gate).to_array();
-                radiance.x[index] += red;
-                radiance.y[index] += green;
-                radiance.z[index] += blue;
+                radiance.add(index, texel.radiance(density, gate));
             }
         }
     }

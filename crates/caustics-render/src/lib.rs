@@ -103,6 +103,7 @@ mod pixel;
 mod screen;
 mod splat;
 mod splat_level;
+mod surroundings;
 mod thinning;
 
 pub use direct::DirectLight;

@@ -45,14 +45,9 @@ impl Screen {
         (point - self.eye).dot(self.forward)
     }
 
-    /// The cosine between a surface's normal and the direction to the eye, up to a positive factor.
-    pub(crate) fn facing(&self, point: Vec3, normal: Vec3) -> f32 {
-        let view = if self.is_perspective {
-            point - self.eye
-        } else {
-            self.forward
-        };
-        -view.dot(normal)
+    /// The cosine between a surface's unit normal and the direction to the eye.
+    pub(crate) fn facing_cosine(&self, point: Vec3, normal: Vec3) -> f32 {
+        self.direction_to_eye(point).dot(normal)
     }
 
     /// The unit direction from a point to the eye.
@@ -95,6 +90,16 @@ impl Screen {
         };
         let distance = (point - origin).dot(normal) / direction.dot(normal);
         (distance > 0.0 && distance.is_finite()).then(|| origin + distance * direction)
+    }
+
+    /// The edges of a pixel on a surface at `point` that faces the view, in metres.
+    pub(crate) fn facing_axes(&self, point: Vec3) -> [Vec3; 2] {
+        let scale = if self.is_perspective {
+            self.depth(point)
+        } else {
+            1.0
+        };
+        [self.step_x, self.step_y].map(|step| scale * step)
     }
 
     /// How the point of a plane that a pixel sees moves with the pixel's two coordinates, in

@@ -2,11 +2,13 @@ use std::f32::consts::FRAC_1_PI;
 
 use caustics_filter::Image;
 use glam::{Vec2, Vec3};
+use std::ops::Range;
 
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
 use crate::splat::{Prepared, STRIDE, Splat};
+use crate::surroundings::{Relation, Surroundings, TILE};
 
 /// Rows of one task.
 const BAND: usize = 16;
@@ -185,7 +187,12 @@ impl<'a> Level<'a> {
     }
 
     /// Adds the splats of this level.
-    pub(crate) fn accumulate(&mut self, prepared: &[Prepared], level: usize) {
+    pub(crate) fn accumulate(
+        &mut self,
+        prepared: &[Prepared],
+        surroundings: &Surroundings,
+        level: usize,
+    ) {
         let bands = self.height.div_ceil(BAND);
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
         for (index, item) in prepared.iter().enumerate() {
@@ -209,7 +216,10 @@ impl<'a> Level<'a> {
             tasks.push(BandTask {
                 first_row: number * BAND,
                 width: self.width,
+                depth: self.depth,
+                surroundings,
                 reflection: &self.reflection,
+                texels: &self.texels,
                 columns: &self.columns,
                 light,
                 first_extra: extras.start,
@@ -323,7 +333,10 @@ impl<'a> Level<'a> {
 struct BandTask<'a> {
     first_row: usize,
     width: usize,
+    depth: u32,
+    surroundings: &'a Surroundings,
     reflection: &'a Reflection,
+    texels: &'a [Option<Texel>],
     columns: &'a TexelColumns,
     /// From the band's first row on.
     light: ColumnsMut<'a>,
@@ -342,20 +355,12 @@ impl BandTask<'_> {
             };
             let first = usize::from(splat.rows[0]).max(self.first_row);
             let last = usize::from(splat.rows[1]).min(self.first_row + rows);
-            for row in first..last {
-                let span = splat.span(row);
-                let start = (row - self.first_row) * self.width;
-                let (from, to) = (row * self.width + span.start, start + span.start);
-                let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
-                match self.reflection {
-                    Reflection::Lambertian => {
-                        self.columns
-                            .light(density, gate, from, span.len(), light, to);
-                    }
-                    Reflection::Glossy(texels) => {
-                        texels.light(density, gate, from, span.len(), light, to);
-                    }
+            if splat.is_plain {
+                for row in first..last {
+                    self.light(splat, row, splat.span(row), Relation::Flat);
                 }
+            } else {
+                self.light_by_tiles(splat, first..last);
             }
             if !self.extras.is_empty() && first < last {
                 let low = (first * self.width) as u32;
@@ -373,6 +378,83 @@ impl BandTask<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// Lights rows of the band tile by tile, each by what it is to the splat.
+    fn light_by_tiles(&mut self, splat: &Splat, rows: Range<usize>) {
+        let margin = margin(self.depth);
+        let tile_of = |pixel: usize| pixel.saturating_sub(margin) / TILE;
+        let [first, last] = splat.columns.map(usize::from);
+        if first >= last {
+            return;
+        }
+        // Columns where something of the same kind begins and ends.
+        let mut runs: Vec<(Range<usize>, Relation)> = Vec::new();
+        let mut tile_row = usize::MAX;
+        for row in rows {
+            if tile_of(row) != tile_row {
+                tile_row = tile_of(row);
+                runs.clear();
+                for column in tile_of(first)..=tile_of(last - 1) {
+                    let place = [column, tile_row];
+                    let relation = self.surroundings.relation(
+                        self.depth,
+                        place,
+                        &splat.density,
+                        &splat.gate,
+                        splat.flat,
+                    );
+                    let end = ((column + 1) * TILE + margin).min(last);
+                    match runs.last_mut() {
+                        Some((run, known)) if *known == relation => run.end = end,
+                        Some((run, _)) => {
+                            let begin = run.end;
+                            runs.push((begin..end, relation));
+                        }
+                        None => runs.push((first..end, relation)),
+                    }
+                }
+                // The margin belongs to the last tile.
+                if let Some((run, _)) = runs.last_mut() {
+                    run.end = last;
+                }
+            }
+            for (run, relation) in &runs {
+                let columns = match relation {
+                    Relation::Dark => continue,
+                    Relation::Flat => {
+                        let span = splat.span(row);
+                        span.start.max(run.start)..span.end.min(run.end)
+                    }
+                    Relation::Own | Relation::Mixed => run.clone(),
+                };
+                self.light(splat, row, columns, *relation);
+            }
+        }
+    }
+
+    /// Lights some columns of a row.
+    fn light(&mut self, splat: &Splat, row: usize, columns: Range<usize>, relation: Relation) {
+        if columns.is_empty() {
+            return;
+        }
+        let count = columns.len();
+        let from = row * self.width + columns.start;
+        let to = (row - self.first_row) * self.width + columns.start;
+        let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
+        match self.reflection {
+            Reflection::Lambertian if relation != Relation::Mixed => {
+                self.columns.light(density, gate, from, count, light, to);
+            }
+            Reflection::Lambertian => {
+                for (index, texel) in (to..).zip(&self.texels[from..from + count]) {
+                    if let Some(texel) = texel {
+                        light.add(index, splat.irradiance(texel));
+                    }
+                }
+            }
+            Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
         }
     }
 
