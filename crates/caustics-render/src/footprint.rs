@@ -40,6 +40,11 @@ pub struct FootprintOptions {
     /// The longer axis may be at most this many times the shorter one, which is widened; at
     /// least 1. Infinite keeps every footprint as its differential says.
     pub max_anisotropy: f32,
+    /// In how many footprints a point may lie that is looked up, on the mean; above 0. Where they
+    /// would be more, one in several of the widest stands for all of them, with their flux: chains
+    /// of inner reflections spread a little light over everything, from thousands of photons.
+    /// Infinite keeps all. Splats draw all of them in any case.
+    pub max_overlaps: f32,
 }
 
 impl Default for FootprintOptions {
@@ -48,6 +53,7 @@ impl Default for FootprintOptions {
             kernel: FootprintKernel::Gaussian,
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
+            max_overlaps: 128.0,
         }
     }
 }
@@ -56,7 +62,7 @@ impl FootprintOptions {
     /// Checks every number.
     ///
     /// # Errors
-    /// A scale or an anisotropy out of range.
+    /// A scale, an anisotropy or a number of overlaps out of range.
     pub fn validate(&self) -> Result<(), RenderError> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             return Err(RenderError::InvalidScale { scale: self.scale });
@@ -64,6 +70,11 @@ impl FootprintOptions {
         if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
             return Err(RenderError::InvalidAnisotropy {
                 max_anisotropy: self.max_anisotropy,
+            });
+        }
+        if self.max_overlaps.is_nan() || self.max_overlaps <= 0.0 {
+            return Err(RenderError::InvalidOverlaps {
+                max_overlaps: self.max_overlaps,
             });
         }
         Ok(())
@@ -479,7 +490,8 @@ mod tests {
             }
             assert!(farthest <= radius, "{kernel:?}: {farthest} of {radius}");
             assert!(
-                farthest > 0.8 * radius,
+                // A disc reaches 1 over the root of two of it.
+                farthest > 0.7 * radius,
                 "{kernel:?}: {farthest} of {radius}"
             );
         }

@@ -8,6 +8,7 @@ use crate::eye::Receiver;
 use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
 use crate::footprint_kernel::FootprintKernel;
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
+use crate::thinning::thin_wide;
 
 /// Footprints' spacings below this part of all are the close ones.
 const CLOSE_QUANTILE: f32 = 0.1;
@@ -49,6 +50,9 @@ pub struct GatherStats {
     /// Of these, photons whose footprint was longer than a thousand times the box around all
     /// photons and was shortened to that.
     pub shortened: u64,
+    /// Photons left out of the many that wide footprints come from, their flux given to others: see
+    /// [`FootprintOptions::max_overlaps`].
+    pub merged: u64,
     /// Photons left out because their flux over their area is more than a number holds.
     pub invalid: u64,
 }
@@ -90,7 +94,8 @@ pub struct GatherStats {
 /// [`irradiance_over`](Self::irradiance_over) adds the blur of a pixel.
 ///
 /// # Cost
-/// A search costs about as much as there are footprints on its point. Long ones that lie askew
+/// A search costs about as much as there are footprints on its point, which
+/// [`FootprintOptions::max_overlaps`] limits. Long ones that lie askew
 /// would cost more, since the boxes around them are mostly empty: they are cut into up to 256
 /// pieces, lengthwise and by their height above the receiver, as long as that saves enough. Of
 /// footprints far larger than the scene only the part in it is cut.
@@ -121,6 +126,8 @@ impl FootprintGather {
         if let Some(photon) = photons.iter().position(|photon| !is_finite(photon)) {
             return Err(RenderError::NonFinitePhoton { photon });
         }
+        let given = photons.len() as u64;
+        let photons = thin_wide(photons, options);
         let around = Aabb::from_points(photons.iter().map(|photon| photon.position));
         let diagonal = if around.is_empty() {
             0.0
@@ -132,11 +139,14 @@ impl FootprintGather {
         } else {
             around.surface_area()
         };
-        let extents = extent_bounds(photons, options, diagonal);
+        let extents = extent_bounds(&photons, options, diagonal);
 
-        let mut stats = GatherStats::default();
+        let mut stats = GatherStats {
+            merged: given - photons.len() as u64,
+            ..GatherStats::default()
+        };
         let mut densities = Vec::with_capacity(photons.len());
-        let prepared = in_chunks(photons, |_, photon| {
+        let prepared = in_chunks(&photons, |_, photon| {
             Density::within(photon, &extents, options)
         });
         for one in prepared {
@@ -507,6 +517,7 @@ mod tests {
             };
             let gather = FootprintGather::new(&photons, &options).unwrap();
             let expected = GatherStats {
+                merged: 0,
                 stored: 3,
                 widened: 2,
                 shortened: 1,
