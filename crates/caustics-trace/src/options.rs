@@ -51,6 +51,9 @@ pub struct TraceOptions {
     pub sequence: Sequence,
     /// Where the lattice is made finer.
     pub refinement: Refinement,
+    /// Whether photons carry differentials. Without, their footprints have no axes: enough for
+    /// estimates from the nearest photons, at less time.
+    pub differentials: bool,
 }
 
 /// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
@@ -90,6 +93,7 @@ impl Default for TraceOptions {
             aim: Aim::Casters,
             sequence: Sequence::Grid,
             refinement: Refinement::default(),
+            differentials: true,
         }
     }
 }

@@ -52,6 +52,8 @@ pub fn trace_photons<I: Intersect + ?Sized>(
             let mut refined = trace_refined(&batch, levels, detail, progress);
             map.photons.append(&mut refined.photons);
             map.ledger.merge(&refined.ledger);
+        } else if !options.differentials {
+            batch.trace::<0>(&mut map, progress);
         } else if emitter.dimensions() == 2 {
             batch.trace::<2>(&mut map, progress);
         } else {
@@ -93,6 +95,7 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
     /// Whether its lattice is made finer where it must.
     fn is_refined(&self) -> bool {
         self.options.refinement.levels > 0
+            && self.options.differentials
             && self.options.sequence == Sequence::Grid
             && self.emitter.dimensions() == 2
             && self.count > 0
