@@ -58,7 +58,7 @@ impl ExactPicture {
     /// A glass ball nearer to the receiver than its focus: a bright edge with a fold.
     ///
     /// # Errors
-    /// If the scene cannot be made; likewise below.
+    /// If the scene cannot be made.
     pub fn sphere_lens() -> Result<Self, TestError> {
         let lens = SphereLens {
             radius: 1.0,
@@ -81,6 +81,9 @@ impl ExactPicture {
     }
 
     /// A plano-convex lens half way to its focus.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
     pub fn plano_convex_lens() -> Result<Self, TestError> {
         let lens = PlanoConvexLens {
             curvature_radius: 1.0,
@@ -104,6 +107,9 @@ impl ExactPicture {
     }
 
     /// The nephroid inside a mirror ring.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
     pub fn mirror_cylinder() -> Result<Self, TestError> {
         let ring = MirrorCylinder {
             radius: 1.0,
@@ -128,6 +134,9 @@ impl ExactPicture {
     }
 
     /// The smooth image that a piece of a parabolic mirror makes, and its ends.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
     pub fn parabolic_mirror() -> Result<Self, TestError> {
         let mirror = ParabolicMirror {
             focal_length: 1.0,
@@ -152,6 +161,9 @@ impl ExactPicture {
     }
 
     /// Waves too low for folds.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
     pub fn wavy_water() -> Result<Self, TestError> {
         let water = WavyWater::with_strength(1.0);
         let half = WATER_HALF;
@@ -160,6 +172,9 @@ impl ExactPicture {
     }
 
     /// Waves with folds.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
     pub fn folded_water() -> Result<Self, TestError> {
         let water = WavyWater::with_strength(3.0);
         let area = (2.0 * WATER_HALF / SIZE as f64).powi(2);
