@@ -1,7 +1,7 @@
 //! Photons traced, footprints splatted and points looked up, a second, on two of the public scenes.
 //!
-//! Differentials are part of every photon: tracing without them is not offered, so there is no
-//! figure for it. What each timed stage makes is compared with the scene's reference first.
+//! What each timed stage makes is compared with the scene's reference first. Photons traced without
+//! differentials must land where those with them do.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -28,6 +28,16 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     options.trace.photons = PHOTONS;
     let trace = || trace_photons(&stage.world, &stage.intersector, &options.trace, &|_| {});
     let map = trace()?;
+    let mut plain_options = options.trace;
+    plain_options.differentials = false;
+    let trace_plain = || trace_photons(&stage.world, &stage.intersector, &plain_options, &|_| {});
+    let plain = trace_plain()?;
+    let is_alike = plain.photons.len() == map.photons.len()
+        && (plain.photons.iter().zip(&map.photons))
+            .all(|(one, other)| one.position == other.position && one.flux == other.flux);
+    if !is_alike {
+        return Err(format!("{name}: photons without differentials land elsewhere").into());
+    }
     let photons = &map.photons;
     let buffer = GBuffer::new(
         &stage.world,
@@ -83,6 +93,9 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     group.throughput(Throughput::Elements(u64::from(PHOTONS)));
     group.bench_function("photons traced", |bencher| {
         bencher.iter(|| black_box(trace()));
+    });
+    group.bench_function("photons traced without differentials", |bencher| {
+        bencher.iter(|| black_box(trace_plain()));
     });
     group.throughput(Throughput::Elements(photons.len() as u64));
     group.bench_function("footprints splatted", |bencher| {

@@ -2,7 +2,7 @@
 
 use caustics::accel::Intersect;
 use caustics::filter::{Image, ImageError};
-use caustics::scene::Surface;
+use caustics::scene::Brdf;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -37,10 +37,11 @@ pub fn receivers(stage: &Stage, width: u32, height: u32) -> Vec<Receiver> {
         let ray = stage.camera.ray(x, y, width, height);
         let hit = stage.intersector.closest_hit(&ray)?;
         let point = stage.world.surface(&ray, &hit)?;
-        let Surface::Diffuse { albedo } = stage.world.materials()[point.material as usize].surface
-        else {
-            return None;
-        };
+        let albedo = stage.world.materials()[point.material as usize]
+            .surface
+            .brdf()
+            .filter(Brdf::is_lambertian)?
+            .base();
         let side = if point.from_outside { 1.0 } else { -1.0 };
         Some(Receiver {
             pixel,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use caustics::prelude::*;
+use caustics::scene::gltf::LoadOptions;
 use lexopt::{Arg, Parser, ValueExt};
 
 const HELP: &str = "\
@@ -22,6 +23,9 @@ usage: render [options] [scene.glb | scene.gltf]
   --list-estimates          name all estimates
   --visibility direct|full  caustics only where the camera sees the receiver itself,
                             or also through glass and in mirrors    (full)
+  --receivers lambertian|glossy
+                            what is neither glass nor mirror: Lambertian, or as metallic and
+                            rough as the file says                  (lambertian)
   --backend cpu             what computes                           (cpu)
   --threads N               threads to use                          (all)
   --exposure EV             brightness of the PNG, in stops         (0)
@@ -51,6 +55,7 @@ pub(crate) enum Request {
 /// What to render and where to.
 pub(crate) struct Arguments {
     pub scene: Option<PathBuf>,
+    pub load: LoadOptions,
     pub camera: usize,
     pub caustics: CausticsOptions,
     pub picture: PictureOptions,
@@ -66,6 +71,7 @@ impl Default for Arguments {
     fn default() -> Self {
         Self {
             scene: None,
+            load: LoadOptions::default(),
             camera: 0,
             caustics: CausticsOptions::default(),
             picture: PictureOptions::default(),
@@ -166,6 +172,10 @@ impl Arguments {
                     parser,
                     &[("direct", Visibility::Direct), ("full", Visibility::Full)],
                 )?;
+            }
+            "receivers" => {
+                self.load.glossy_receivers =
+                    choice(name, parser, &[("lambertian", false), ("glossy", true)])?;
             }
             "backend" => choice(name, parser, &[("cpu", ())])?,
             "out" => self.out = path(name, parser)?,

@@ -9,7 +9,6 @@ mod report;
 mod reporter;
 
 use std::io::Write;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -52,7 +51,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| format!("--threads {threads}: {error}"))?;
     }
     let start = Instant::now();
-    let (name, mut scene, warnings) = load(arguments.scene.as_deref())?;
+    let (name, mut scene, warnings) = load(arguments)?;
     let notices = default_view::complete(&mut scene).map_err(|error| format!("{name}: {error}"))?;
     let camera = scene
         .cameras()
@@ -114,8 +113,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn load(path: Option<&Path>) -> Result<(String, Scene, Vec<gltf::Warning>), Failure> {
-    let Some(path) = path else {
+fn load(arguments: &Arguments) -> Result<(String, Scene, Vec<gltf::Warning>), Failure> {
+    let Some(path) = &arguments.scene else {
         return Ok((
             "the built-in cognac glass".into(),
             builtin::cognac_glass(),
@@ -123,6 +122,7 @@ fn load(path: Option<&Path>) -> Result<(String, Scene, Vec<gltf::Warning>), Fail
         ));
     };
     let name = path.display().to_string();
-    let loaded = gltf::load_path(path).map_err(|error| format!("{name}: {error}"))?;
+    let loaded =
+        gltf::load_path_with(path, &arguments.load).map_err(|error| format!("{name}: {error}"))?;
     Ok((name, loaded.scene, loaded.warnings))
 }

@@ -48,6 +48,14 @@ pub(crate) struct ColumnsMut<'a> {
     pub(crate) z: &'a mut [f32],
 }
 
+impl ColumnsMut<'_> {
+    pub(crate) fn add(&mut self, index: usize, value: Vec3) {
+        self.x[index] += value.x;
+        self.y[index] += value.y;
+        self.z[index] += value.z;
+    }
+}
+
 /// Positions and normals of texels; a pixel without one has a zero normal and is never lit.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TexelColumns {
@@ -141,7 +149,7 @@ impl TexelColumns {
             let off = dx * normal.x + dy * normal.y + dz * normal.z;
             let alike = nx[i] * normal.x + ny[i] * normal.y + nz[i] * normal.z;
             let cosine = -(nx[i] * incoming.x + ny[i] * incoming.y + nz[i] * incoming.z);
-            let is_before = (off >= 0.0) & (off <= gate.reach);
+            let is_before = (off >= gate.before) & (off <= gate.reach);
             let is_beyond = (off >= -gate.plane_distance) & (alike >= gate.normal_cosine);
             let is_lit = is_before | (is_beyond & (off < 0.0));
             let weight = kernel(u, v) * cosine.max(0.0);

@@ -1,5 +1,3 @@
-use std::f32::consts::FRAC_1_PI;
-
 use caustics_accel::Intersect;
 use caustics_geometry::{Frame, Ray};
 use caustics_sampling::CounterRng;
@@ -30,28 +28,28 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         Self { world, intersect }
     }
 
-    /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²): exact for
+    /// Radiance that a receiver reflects towards the eye, in W/(sr m²): exact for
     /// point, spot and directional lights, from one random point on each light with an area.
     pub fn radiance(&self, receiver: &Receiver, rng: &mut CounterRng) -> Vec3 {
-        let mut irradiance = Vec3::ZERO;
+        let mut reflected = Vec3::ZERO;
         for light in self.world.lights() {
-            irradiance += match *light {
+            reflected += match *light {
                 Light::Sphere {
                     center,
                     radius,
                     radiance,
-                } => self.arriving_from_ball(receiver, center, radius, radiance, rng),
-                _ if light.area().is_some() => self.arriving_from_surface(receiver, light, rng),
-                _ => self.arriving_from(receiver, light),
+                } => self.reflected_from_ball(receiver, center, radius, radiance, rng),
+                _ if light.area().is_some() => self.reflected_from_surface(receiver, light, rng),
+                _ => self.reflected_from(receiver, light),
             };
         }
         for light in self.world.emitters() {
-            irradiance += self.arriving_from_area(receiver, light, rng);
+            reflected += self.reflected_from_area(receiver, light, rng);
         }
-        receiver.albedo * FRAC_1_PI * irradiance
+        reflected
     }
 
-    fn arriving_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
+    fn reflected_from(&self, receiver: &Receiver, light: &Light) -> Vec3 {
         let position = receiver.point.spawn.position;
         let (direction, distance, facing) = match *light {
             Light::Point { position: lamp, .. } | Light::Spot { position: lamp, .. } => {
@@ -77,11 +75,11 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if cosine <= 0.0 || facing == Vec3::ZERO || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        cosine * facing
+        receiver.reflectance(direction) * (cosine * facing)
     }
 
     /// From one random point of a rectangle or a disc.
-    fn arriving_from_surface(
+    fn reflected_from_surface(
         &self,
         receiver: &Receiver,
         light: &Light,
@@ -101,11 +99,13 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if leaving <= 0.0 || cosine <= 0.0 || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        light.radiance() * (area * leaving * cosine / (distance * distance))
+        receiver.reflectance(direction)
+            * light.radiance()
+            * (area * leaving * cosine / (distance * distance))
     }
 
     /// From one random direction into the cone that a ball fills; it shines outwards only.
-    fn arriving_from_ball(
+    fn reflected_from_ball(
         &self,
         receiver: &Receiver,
         center: Vec3,
@@ -137,10 +137,10 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if self.is_blocked(receiver, direction, near) {
             return Vec3::ZERO;
         }
-        radiance * (cone.solid_angle() * cosine)
+        receiver.reflectance(direction) * radiance * (cone.solid_angle() * cosine)
     }
 
-    fn arriving_from_area(
+    fn reflected_from_area(
         &self,
         receiver: &Receiver,
         light: &AreaLight,
@@ -165,7 +165,9 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         if leaving <= 0.0 || cosine <= 0.0 || self.is_blocked(receiver, direction, distance) {
             return Vec3::ZERO;
         }
-        light.radiance() * (light.area() * leaving * cosine / (distance * distance))
+        receiver.reflectance(direction)
+            * light.radiance()
+            * (light.area() * leaving * cosine / (distance * distance))
     }
 
     /// The cosine of the incident light, 0 if it does not reach the side that is seen. The smooth

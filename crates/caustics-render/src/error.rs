@@ -40,6 +40,12 @@ pub enum RenderError {
         /// The limit.
         max_anisotropy: f32,
     },
+    /// A number of overlaps that no photon could keep to.
+    #[error("the number of overlaps {max_overlaps} is not above 0")]
+    InvalidOverlaps {
+        /// The number.
+        max_overlaps: f32,
+    },
     /// A photon with a NaN or infinite number in it.
     #[error("photon {photon} is not finite")]
     NonFinitePhoton {

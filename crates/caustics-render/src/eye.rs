@@ -1,9 +1,10 @@
 use caustics_accel::Intersect;
 use caustics_geometry::Ray;
 use caustics_sampling::CounterRng;
-use caustics_scene::{Surface, SurfacePoint, World};
+use caustics_scene::{Brdf, Surface, SurfacePoint, World};
 use caustics_trace::{Event, MediumStack, Scattering, beer_lambert, scatter};
 use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 
 /// Branches whose part of the pixel falls below this meet Russian roulette.
 const MIN_WEIGHT: f32 = 0.02;
@@ -17,14 +18,45 @@ pub struct Receiver {
     pub normal: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,
-    /// Reflectance for each channel.
-    pub albedo: Vec3,
+    /// How it reflects.
+    pub brdf: Brdf,
     /// Unit direction from the receiver towards the eye.
     pub outgoing: Vec3,
     /// The part of the radiance that leaves the receiver which reaches the eye, for each channel.
     pub weight: Vec3,
     /// Whether the camera sees it without a mirror or a glass between.
     pub seen_directly: bool,
+}
+
+impl Receiver {
+    /// The part of the light from the unit direction `to_light` that goes towards the eye, in 1/sr,
+    /// for each channel: radiance over irradiance.
+    ///
+    /// The smooth normal shades, unless it faces away from the eye.
+    #[must_use]
+    pub fn reflectance(&self, to_light: Vec3) -> Vec3 {
+        let normal = serving_normal(self.normal, self.shading_normal, self.outgoing);
+        reflectance(&self.brdf, normal, to_light, self.outgoing)
+    }
+}
+
+/// The interpolated normal if the eye is on its side, else the geometric one.
+pub(crate) fn serving_normal(geometric: Vec3, shading: Vec3, to_eye: Vec3) -> Vec3 {
+    if shading.dot(to_eye) > 0.0 {
+        shading
+    } else {
+        geometric
+    }
+}
+
+/// As [`Brdf::evaluate`]; a Lambertian receiver reflects the same whatever the shading normal is.
+#[inline]
+pub(crate) fn reflectance(brdf: &Brdf, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> Vec3 {
+    if brdf.is_lambertian() {
+        FRAC_1_PI * brdf.base()
+    } else {
+        brdf.evaluate(normal, to_light, to_eye)
+    }
 }
 
 /// Follows eye paths through mirrors and glass to the receivers that they end on: Whitted's
@@ -110,21 +142,21 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
         } else {
             Vec3::ZERO
         };
-        match material.surface {
-            Surface::Diffuse { albedo } => {
+        match (material.surface, material.surface.brdf()) {
+            (_, Some(brdf)) => {
                 let side = if point.from_outside { 1.0 } else { -1.0 };
                 let receiver = Receiver {
                     point,
                     normal: side * point.geometric_normal,
                     shading_normal: side * point.shading_normal,
-                    albedo,
+                    brdf,
                     outgoing: -branch.ray.direction,
                     weight: branch.weight,
                     seen_directly: branch.seen_directly,
                 };
                 visit(&receiver, rng);
             }
-            Surface::Dielectric { dispersion, .. }
+            (Surface::Dielectric { dispersion, .. }, _)
                 if dispersion > 0.0 && branch.channel.is_none() =>
             {
                 for channel in 0..3usize {

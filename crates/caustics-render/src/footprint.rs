@@ -10,10 +10,20 @@ use crate::footprint_kernel::FootprintKernel;
 const MIN_INCIDENCE: f32 = 0.05;
 
 /// The least cosine between the normals of a footprint and of a point that it may light.
-pub(crate) const MIN_NORMAL_COSINE: f32 = 0.5;
+const MIN_NORMAL_COSINE: f32 = 0.5;
 
-/// How far off its plane a footprint lights, relative to its radius.
+/// How far off its plane a footprint lights, relative to its reach.
 const PLANE_DISTANCE: f32 = 0.3;
+
+/// Another object whose normal has at least this cosine with the footprint's is parallel to it.
+const PARALLEL_COSINE: f32 = 0.9;
+
+/// How far off its plane a footprint lights other objects that are parallel to it, relative to its
+/// reach: tiles of one floor, but not a sheet that lies above or below it.
+const TOUCHING: f32 = 0.05;
+
+/// How far before its plane a surface still is in it, relative to a footprint's reach.
+const IN_PLANE: f32 = 1e-3;
 
 /// How far along its light a point is followed to the footprint's plane, relative to the distance
 /// allowed off that plane: at grazing incidence, points that the light passes far above are not
@@ -30,6 +40,11 @@ pub struct FootprintOptions {
     /// The longer axis may be at most this many times the shorter one, which is widened; at
     /// least 1. Infinite keeps every footprint as its differential says.
     pub max_anisotropy: f32,
+    /// In how many footprints a point may lie that is looked up, on the mean; above 0. Where they
+    /// would be more, one in several of the widest stands for all of them, with their flux: chains
+    /// of inner reflections spread a little light over everything, from thousands of photons.
+    /// Infinite keeps all. Splats draw all of them in any case.
+    pub max_overlaps: f32,
 }
 
 impl Default for FootprintOptions {
@@ -38,6 +53,7 @@ impl Default for FootprintOptions {
             kernel: FootprintKernel::Gaussian,
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
+            max_overlaps: 128.0,
         }
     }
 }
@@ -46,7 +62,7 @@ impl FootprintOptions {
     /// Checks every number.
     ///
     /// # Errors
-    /// A scale or an anisotropy out of range.
+    /// A scale, an anisotropy or a number of overlaps out of range.
     pub fn validate(&self) -> Result<(), RenderError> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             return Err(RenderError::InvalidScale { scale: self.scale });
@@ -54,6 +70,11 @@ impl FootprintOptions {
         if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
             return Err(RenderError::InvalidAnisotropy {
                 max_anisotropy: self.max_anisotropy,
+            });
+        }
+        if self.max_overlaps.is_nan() || self.max_overlaps <= 0.0 {
+            return Err(RenderError::InvalidOverlaps {
+                max_overlaps: self.max_overlaps,
             });
         }
         Ok(())
@@ -86,6 +107,8 @@ pub(crate) struct Density {
     /// its irradiance.
     strength: Vec3,
     kernel: FootprintKernel,
+    /// Index of its receiver among the world's objects.
+    pub(crate) object: u32,
 }
 
 impl Density {
@@ -101,6 +124,18 @@ impl Density {
             covariance.add_pixel(&pixel, photon.normal, options.kernel);
         }
         Self::spread(&Beam::of(photon), &covariance, options.kernel)
+    }
+
+    /// The density of a photon on what catches its light before its plane, blurred by a pixel whose
+    /// edges there are `pixel`.
+    pub(crate) fn before_plane(
+        photon: &Photon,
+        pixel: [Vec3; 2],
+        options: &FootprintOptions,
+    ) -> Option<Self> {
+        let up = towards_light(photon.incoming, photon.normal);
+        let slid = pixel.map(|edge| edge - edge.dot(photon.normal) * up);
+        Self::new(photon, Some(slid), options)
     }
 
     /// The density of a photon without a pixel, with its standard deviations kept within bounds, and
@@ -148,6 +183,7 @@ impl Density {
             normal: self.normal,
             incoming: self.incoming,
             flux: self.strength * (xx * yy * cosine),
+            object: self.object,
         };
         Self::spread(&beam, &covariance, self.kernel)
     }
@@ -158,6 +194,7 @@ impl Density {
             normal,
             incoming,
             flux,
+            object,
         } = *beam;
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let [[xx, _], [xy, yy]] = covariance.cholesky()?;
@@ -179,6 +216,7 @@ impl Density {
             axes: [xx * tangent + xy * bitangent, yy * bitangent],
             strength: flux / (area * cosine),
             kernel,
+            object,
         };
         (area > 0.0 && density.strength.is_finite()).then_some(density)
     }
@@ -189,22 +227,13 @@ impl Density {
         // is limited, too.
         let cosine = -self.incoming.dot(self.normal);
         let reach = self.radius() * (MAX_SLIDE * cosine).clamp(MIN_INCIDENCE, 1.0);
-        Gate {
-            reach,
-            plane_distance: PLANE_DISTANCE * reach,
-            normal_cosine: MIN_NORMAL_COSINE,
-        }
+        Gate::new(reach)
     }
 
     /// The way from its plane towards the light, one metre off the plane: how points are followed
     /// to it.
     pub(crate) fn towards_light(&self) -> Vec3 {
-        let incidence = self.incoming.dot(self.normal);
-        if incidence < -MIN_INCIDENCE {
-            self.incoming / incidence
-        } else {
-            self.normal
-        }
+        towards_light(self.incoming, self.normal)
     }
 
     /// Where its longest axis lies: the coordinates, in standard deviations, of a point one
@@ -294,7 +323,24 @@ impl Density {
     /// No point farther from the center than this, in metres, belongs to the footprint.
     pub(crate) fn radius(&self) -> f32 {
         let [a, b] = self.half_extents();
-        (a.length_squared() + b.length_squared()).sqrt()
+        let ellipse = a.length_squared() + b.length_squared();
+        // A tent reaches into the corners of the parallelogram, an ellipse does not.
+        let corners = if self.kernel == FootprintKernel::Tent {
+            2.0 * a.dot(b).abs()
+        } else {
+            0.0
+        };
+        (ellipse + corners).sqrt()
+    }
+}
+
+/// The way from a plane towards the light, one metre off the plane.
+fn towards_light(incoming: Vec3, normal: Vec3) -> Vec3 {
+    let incidence = incoming.dot(normal);
+    if incidence < -MIN_INCIDENCE {
+        incoming / incidence
+    } else {
+        normal
     }
 }
 
@@ -302,9 +348,12 @@ impl Density {
 ///
 /// What stands before the footprint's plane, as a wall does that its receiver ends at, catches the
 /// light on its way to the plane. What lies beyond the plane is lit only if it is the receiver
-/// itself, curving away: not what is to be seen past its edge.
+/// itself, curving away: not what is to be seen past its edge. Another object that is parallel to
+/// the receiver is lit only where it continues it: not a sheet above or below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gate {
+    /// From where before the footprint's plane other surfaces catch its light, in metres.
+    pub(crate) before: f32,
     /// How far before the footprint's plane, in metres.
     pub(crate) reach: f32,
     /// How far beyond the footprint's plane, in metres.
@@ -314,20 +363,56 @@ pub(crate) struct Gate {
 }
 
 impl Gate {
-    /// Whether a point with a normal passes.
-    pub(crate) fn admits(&self, density: &Density, point: Vec3, normal: Vec3) -> bool {
+    /// The gate of a footprint that lights what is up to `reach` before its plane, in metres.
+    pub(crate) fn new(reach: f32) -> Self {
+        Self {
+            before: 0.0,
+            reach,
+            plane_distance: PLANE_DISTANCE * reach,
+            normal_cosine: MIN_NORMAL_COSINE,
+        }
+    }
+
+    /// In two: the footprint's plane and what is beyond it, and what catches its light before.
+    pub(crate) fn divided(self) -> [Self; 2] {
+        let seam = IN_PLANE * self.reach;
+        let own = Self {
+            reach: seam,
+            ..self
+        };
+        let before = Self {
+            before: seam,
+            plane_distance: -seam,
+            ..self
+        };
+        [own, before]
+    }
+
+    /// Whether a point with a normal, on an object if that is known, passes.
+    pub(crate) fn admits(
+        &self,
+        density: &Density,
+        point: Vec3,
+        normal: Vec3,
+        object: Option<u32>,
+    ) -> bool {
         let off = (point - density.center).dot(density.normal);
-        self.admits_at(off, normal.dot(density.normal))
+        let is_own = object.is_none_or(|object| object == density.object);
+        self.admits_at(off, normal.dot(density.normal), is_own)
     }
 
     /// Whether a point passes that lies `off` metres before the plane, and whose normal has this
-    /// cosine with the footprint's.
+    /// cosine with the footprint's; on the footprint's own receiver, or on another object.
     #[inline]
-    pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32) -> bool {
-        let lowest = if normal_cosine >= self.normal_cosine {
+    pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32, is_own: bool) -> bool {
+        if !is_own && normal_cosine >= PARALLEL_COSINE {
+            let touching = TOUCHING * self.reach;
+            return off >= -touching.min(self.plane_distance) && off <= touching;
+        }
+        let lowest = if is_own && normal_cosine >= self.normal_cosine {
             -self.plane_distance
         } else {
-            0.0
+            self.before
         };
         off >= lowest && off <= self.reach
     }
@@ -347,6 +432,7 @@ struct Beam {
     normal: Vec3,
     incoming: Vec3,
     flux: Vec3,
+    object: u32,
 }
 
 impl Beam {
@@ -356,6 +442,7 @@ impl Beam {
             normal: photon.normal,
             incoming: photon.incoming,
             flux: photon.flux,
+            object: photon.object,
         }
     }
 }
@@ -372,4 +459,47 @@ pub(crate) struct ExtentBounds {
 pub(crate) struct Adjustment {
     pub(crate) widened: bool,
     pub(crate) shortened: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Light falls nowhere beyond the radius, and close to it, for footprints that lie askew.
+    #[test]
+    fn the_radius_is_how_far_light_reaches() {
+        for kernel in FootprintKernel::ALL {
+            let options = FootprintOptions {
+                kernel,
+                ..FootprintOptions::default()
+            };
+            let photon = Photon {
+                position: Vec3::ZERO,
+                incoming: Vec3::NEG_Y,
+                flux: Vec3::ONE,
+                normal: Vec3::Y,
+                axes: [Vec3::new(1.0, 0.0, 0.8), Vec3::new(0.1, 0.0, 0.3)],
+                object: 0,
+                events: 1,
+                source: caustics_trace::FootprintSource::Differential,
+            };
+            let density = Density::new(&photon, None, &options).expect("it has an area");
+            let radius = density.radius();
+            let mut farthest = 0.0f32;
+            for step in 0..200_000 {
+                let (sine, cosine) = (step as f32 * 2.399_963).sin_cos();
+                let far = 1.5 * radius * (step as f32 / 200_000.0).sqrt();
+                let point = far * Vec3::new(cosine, 0.0, sine);
+                if density.irradiance(point, Vec3::Y).x > 0.0 {
+                    farthest = farthest.max(far);
+                }
+            }
+            assert!(farthest <= radius, "{kernel:?}: {farthest} of {radius}");
+            assert!(
+                // A disc reaches 1 over the root of two of it.
+                farthest > 0.7 * radius,
+                "{kernel:?}: {farthest} of {radius}"
+            );
+        }
+    }
 }

@@ -1,5 +1,3 @@
-use std::f32::consts::FRAC_1_PI;
-
 use caustics_accel::BoxTree;
 use caustics_geometry::Aabb;
 use caustics_trace::Photon;
@@ -10,6 +8,7 @@ use crate::eye::Receiver;
 use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
 use crate::footprint_kernel::FootprintKernel;
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
+use crate::thinning::thin_wide;
 
 /// Footprints' spacings below this part of all are the close ones.
 const CLOSE_QUANTILE: f32 = 0.1;
@@ -51,6 +50,9 @@ pub struct GatherStats {
     /// Of these, photons whose footprint was longer than a thousand times the box around all
     /// photons and was shortened to that.
     pub shortened: u64,
+    /// Photons left out of the many that wide footprints come from, their flux given to others: see
+    /// [`FootprintOptions::max_overlaps`].
+    pub merged: u64,
     /// Photons left out because their flux over their area is more than a number holds.
     pub invalid: u64,
 }
@@ -92,7 +94,8 @@ pub struct GatherStats {
 /// [`irradiance_over`](Self::irradiance_over) adds the blur of a pixel.
 ///
 /// # Cost
-/// A search costs about as much as there are footprints on its point. Long ones that lie askew
+/// A search costs about as much as there are footprints on its point, which
+/// [`FootprintOptions::max_overlaps`] limits. Long ones that lie askew
 /// would cost more, since the boxes around them are mostly empty: they are cut into up to 256
 /// pieces, lengthwise and by their height above the receiver, as long as that saves enough. Of
 /// footprints far larger than the scene only the part in it is cut.
@@ -123,6 +126,8 @@ impl FootprintGather {
         if let Some(photon) = photons.iter().position(|photon| !is_finite(photon)) {
             return Err(RenderError::NonFinitePhoton { photon });
         }
+        let given = photons.len() as u64;
+        let photons = thin_wide(photons, options);
         let around = Aabb::from_points(photons.iter().map(|photon| photon.position));
         let diagonal = if around.is_empty() {
             0.0
@@ -134,11 +139,14 @@ impl FootprintGather {
         } else {
             around.surface_area()
         };
-        let extents = extent_bounds(photons, options, diagonal);
+        let extents = extent_bounds(&photons, options, diagonal);
 
-        let mut stats = GatherStats::default();
+        let mut stats = GatherStats {
+            merged: given - photons.len() as u64,
+            ..GatherStats::default()
+        };
         let mut densities = Vec::with_capacity(photons.len());
-        let prepared = in_chunks(photons, |_, photon| {
+        let prepared = in_chunks(&photons, |_, photon| {
             Density::within(photon, &extents, options)
         });
         for one in prepared {
@@ -173,19 +181,49 @@ impl FootprintGather {
 
     /// Irradiance at a point of a surface with unit `normal`, in W/m² for each channel, by the
     /// light that falls on the side of the normal.
+    ///
+    /// Whatever object the point belongs to: it may share light with a parallel surface that is
+    /// closer to it than a part of a footprint's width. [`irradiance_on`](Self::irradiance_on) knows
+    /// better.
     #[must_use]
     pub fn irradiance(&self, position: Vec3, normal: Vec3) -> Vec3 {
-        let target = Target { position, normal };
+        self.irradiance_at(&Target {
+            position,
+            normal,
+            object: None,
+        })
+    }
+
+    /// Irradiance as in [`irradiance`](Self::irradiance), at a point of the object with this index
+    /// among the world's.
+    #[must_use]
+    pub fn irradiance_on(&self, object: u32, position: Vec3, normal: Vec3) -> Vec3 {
+        self.irradiance_at(&Target {
+            position,
+            normal,
+            object: Some(object),
+        })
+    }
+
+    fn irradiance_at(&self, target: &Target) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        self.tree.for_each_around(position, |place| {
-            let piece = &self.pieces[place];
-            let index = piece.footprint as usize;
-            let kernel = self.footprints[index].kernel_at(piece, &target, self.kernel);
-            if kernel > 0.0 {
-                sum += self.densities[index].irradiance_at(kernel, normal);
-            }
+        self.for_each_lighting(target, |density, kernel| {
+            sum += density.irradiance_at(kernel, target.normal);
         });
         sum
+    }
+
+    /// Calls `visit` with each footprint that lights a point, and its kernel there.
+    #[inline]
+    fn for_each_lighting(&self, target: &Target, mut visit: impl FnMut(&Density, f32)) {
+        self.tree.for_each_around(target.position, |place| {
+            let piece = &self.pieces[place];
+            let index = piece.footprint as usize;
+            let kernel = self.footprints[index].kernel_at(piece, target, self.kernel);
+            if kernel > 0.0 {
+                visit(&self.densities[index], kernel);
+            }
+        });
     }
 
     /// Irradiance as in [`irradiance`](Self::irradiance), averaged over a pixel whose edges on the
@@ -196,39 +234,70 @@ impl FootprintGather {
     /// no photon landed.
     #[must_use]
     pub fn irradiance_over(&self, position: Vec3, normal: Vec3, pixel: [Vec3; 2]) -> Vec3 {
+        let target = Target {
+            position,
+            normal,
+            object: None,
+        };
+        let mut sum = Vec3::ZERO;
+        self.for_each_over(&target, pixel, |blurred| {
+            sum += blurred.irradiance(position, normal);
+        });
+        sum
+    }
+
+    /// Calls `visit` with each footprint, blurred by a pixel, that lights a point.
+    fn for_each_over(&self, target: &Target, pixel: [Vec3; 2], mut visit: impl FnMut(&Density)) {
+        let Target {
+            position,
+            normal,
+            object,
+        } = *target;
         let [a, b] = pixel;
         let reach = self.blur_reach * (a.length_squared() + b.length_squared()).sqrt();
         let query = Aabb {
             min: position - reach,
             max: position + reach,
         };
-        let mut sum = Vec3::ZERO;
         self.tree.for_each_overlapping(&query, |place| {
             let piece = &self.pieces[place];
             let index = piece.footprint as usize;
             if self.footprints[index].is_in(piece, position)
                 && let Some(blurred) = self.densities[index].blurred(&pixel)
-                && blurred.gate().admits(&blurred, position, normal)
+                && blurred.gate().admits(&blurred, position, normal, object)
             {
-                sum += blurred.irradiance(position, normal);
+                visit(&blurred);
             }
         });
-        sum
     }
 
-    /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²).
+    /// Radiance that a receiver reflects towards the eye, in W/(sr m²): each photon's part by its own
+    /// direction.
     #[must_use]
     pub fn radiance(&self, receiver: &Receiver) -> Vec3 {
-        let irradiance = self.irradiance(receiver.point.spawn.position, receiver.normal);
-        receiver.albedo * FRAC_1_PI * irradiance
+        let target = Target::of(receiver);
+        if receiver.brdf.is_lambertian() {
+            return receiver.reflectance(target.normal) * self.irradiance_at(&target);
+        }
+        let mut sum = Vec3::ZERO;
+        self.for_each_lighting(&target, |density, kernel| {
+            let reflectance = receiver.reflectance(-density.incoming);
+            sum += reflectance * density.irradiance_at(kernel, target.normal);
+        });
+        sum
     }
 
     /// Radiance as in [`radiance`](Self::radiance), averaged over a pixel whose edges on the
     /// receiver are `pixel`, in metres.
     #[must_use]
     pub fn radiance_over(&self, receiver: &Receiver, pixel: [Vec3; 2]) -> Vec3 {
-        let position = receiver.point.spawn.position;
-        receiver.albedo * FRAC_1_PI * self.irradiance_over(position, receiver.normal, pixel)
+        let target = Target::of(receiver);
+        let mut sum = Vec3::ZERO;
+        self.for_each_over(&target, pixel, |blurred| {
+            let reflectance = receiver.reflectance(-blurred.incoming);
+            sum += reflectance * blurred.irradiance(target.position, target.normal);
+        });
+        sum
     }
 
     /// What became of the photons.
@@ -449,6 +518,7 @@ mod tests {
             };
             let gather = FootprintGather::new(&photons, &options).unwrap();
             let expected = GatherStats {
+                merged: 0,
                 stored: 3,
                 widened: 2,
                 shortened: 1,
@@ -560,11 +630,11 @@ mod tests {
                     let (position, normal) = (photon.position + aside, photon.normal);
                     let (mut alone, mut blurred) = (Vec3::ZERO, Vec3::ZERO);
                     for density in &gather.densities {
-                        if density.gate().admits(density, position, normal) {
+                        if density.gate().admits(density, position, normal, None) {
                             alone += density.irradiance(position, normal);
                         }
                         let density = density.blurred(&pixel).unwrap();
-                        if density.gate().admits(&density, position, normal) {
+                        if density.gate().admits(&density, position, normal, None) {
                             blurred += density.irradiance(position, normal);
                         }
                     }

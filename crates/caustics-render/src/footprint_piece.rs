@@ -1,7 +1,8 @@
 use caustics_geometry::Aabb;
 use glam::{Vec2, Vec3};
 
-use crate::footprint::{Density, Gate, MIN_NORMAL_COSINE};
+use crate::eye::Receiver;
+use crate::footprint::{Density, Gate};
 use crate::footprint_kernel::FootprintKernel;
 
 /// The most pieces that a layer is cut into.
@@ -30,8 +31,9 @@ pub(crate) struct Footprint {
     /// See [`Density::long_direction`].
     long: Vec2,
     /// See [`Gate`].
-    plane_distance: f32,
     reach: f32,
+    /// Index of the receiver among the world's objects.
+    object: u32,
 }
 
 /// The part of what a footprint may light that lies between two distances along its longest axis,
@@ -63,19 +65,14 @@ impl Piece {
 impl Footprint {
     pub(crate) fn new(density: &Density) -> Self {
         let [u_gradient, v_gradient] = density.gradients();
-        let Gate {
-            reach,
-            plane_distance,
-            ..
-        } = density.gate();
         Self {
             center: density.center,
             normal: density.normal,
             u_gradient,
             v_gradient,
             long: density.long_direction(),
-            plane_distance,
-            reach,
+            reach: density.gate().reach,
+            object: density.object,
         }
     }
 
@@ -87,13 +84,9 @@ impl Footprint {
             coordinates,
             height,
         } = self.place(target.position);
-        let gate = Gate {
-            reach: self.reach,
-            plane_distance: self.plane_distance,
-            normal_cosine: MIN_NORMAL_COSINE,
-        };
+        let is_own = target.object.is_none_or(|object| object == self.object);
         let is_lit = piece.holds(coordinates.dot(self.long), height)
-            && gate.admits_at(height, self.normal.dot(target.normal));
+            && Gate::new(self.reach).admits_at(height, self.normal.dot(target.normal), is_own);
         if is_lit {
             kernel.density(coordinates.x, coordinates.y)
         } else {
@@ -127,11 +120,23 @@ struct Place {
     height: f32,
 }
 
-/// A point of a surface with a unit normal.
+/// A point of a surface with a unit normal, and the object that it belongs to if that is known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Target {
     pub(crate) position: Vec3,
     pub(crate) normal: Vec3,
+    pub(crate) object: Option<u32>,
+}
+
+impl Target {
+    /// What an eye path reached.
+    pub(crate) fn of(receiver: &Receiver) -> Self {
+        Self {
+            position: receiver.point.spawn.position,
+            normal: receiver.normal,
+            object: Some(receiver.point.object),
+        }
+    }
 }
 
 /// How footprints are cut.

@@ -1,6 +1,6 @@
 use caustics_accel::Intersect;
 use caustics_geometry::Ray;
-use caustics_scene::{Camera, Surface, World};
+use caustics_scene::{Brdf, Camera, World};
 use glam::Vec3;
 
 use crate::error::RenderError;
@@ -20,8 +20,12 @@ pub struct Texel {
     pub position: Vec3,
     /// Unit geometric normal on the side that is seen.
     pub normal: Vec3,
-    /// Reflectance for each channel, times the part of the pixel that it fills.
-    pub albedo: Vec3,
+    /// Unit interpolated normal on the same side.
+    pub shading_normal: Vec3,
+    /// The part of the pixel that it fills.
+    pub coverage: f32,
+    /// Index among the world's materials.
+    pub material: u32,
     /// Index among the world's objects.
     pub object: u32,
 }
@@ -39,6 +43,8 @@ pub struct GBuffer {
     pub(crate) texels: Vec<Option<Texel>>,
     /// The further parts, ordered by pixel.
     pub(crate) extras: Vec<(u32, Texel)>,
+    /// How the world's materials reflect; those that are not specular.
+    brdfs: Vec<Option<Brdf>>,
     rays: u64,
 }
 
@@ -75,6 +81,11 @@ impl GBuffer {
             screen: Screen::new(camera, width, height),
             texels: centers.clone(),
             extras: Vec::new(),
+            brdfs: world
+                .materials()
+                .iter()
+                .map(|material| material.surface.brdf())
+                .collect(),
             rays: centers.len() as u64,
         };
         for (pixel, parts) in refined.into_iter().flatten() {
@@ -84,6 +95,18 @@ impl GBuffer {
             buffer.extras.extend(parts.map(|part| (pixel, part)));
         }
         Ok(buffer)
+    }
+
+    /// How a texel of this buffer reflects.
+    pub(crate) fn brdf(&self, texel: &Texel) -> Brdf {
+        let brdf = self.brdfs.get(texel.material as usize).copied().flatten();
+        brdf.unwrap_or(Brdf::lambertian(Vec3::ZERO))
+    }
+
+    /// Whether some texel is not Lambertian.
+    pub(crate) fn is_glossy(&self) -> bool {
+        let is_glossy = |brdf: &Option<Brdf>| brdf.is_some_and(|brdf| !brdf.is_lambertian());
+        self.brdfs.iter().any(is_glossy)
     }
 
     /// Width in pixels.
@@ -135,15 +158,17 @@ impl<I: Intersect + ?Sized> Looker<'_, I> {
         let ray: Ray = self.camera.ray(x, y, self.width, self.height);
         let hit = self.intersect.closest_hit(&ray)?;
         let point = self.world.surface(&ray, &hit)?;
-        let Surface::Diffuse { albedo } = self.world.materials()[point.material as usize].surface
-        else {
+        let material = &self.world.materials()[point.material as usize];
+        if material.surface.is_specular() {
             return None;
-        };
+        }
         let side = if point.from_outside { 1.0 } else { -1.0 };
         let texel = Texel {
             position: point.spawn.position,
             normal: side * point.geometric_normal,
-            albedo,
+            shading_normal: side * point.shading_normal,
+            coverage: 1.0,
+            material: point.material,
             object: point.object,
         };
         Some(texel)
@@ -188,7 +213,7 @@ impl<I: Intersect + ?Sized> Looker<'_, I> {
             .into_iter()
             .map(|(part, count)| Texel {
                 position: part.position / count as f32,
-                albedo: part.albedo * (count as f32 * share),
+                coverage: count as f32 * share,
                 ..part
             })
             .collect()

@@ -70,7 +70,7 @@
 //! # Conventions
 //!
 //! Radiance in W/(sr m²), irradiance in W/m², linear RGB; lengths in metres. Receivers are
-//! Lambertian. Everything is deterministic: the same seed gives the same bits on any number of
+//! Lambertian or glossy, and reflect each photon's light by its own direction. Everything is deterministic: the same seed gives the same bits on any number of
 //! threads.
 //!
 //! # Limits
@@ -78,7 +78,8 @@
 //! Footprints are flat: on a receiver that curves within one, light is followed along the photon's
 //! direction to the surface, and no farther. A specular object casts a full shadow in direct
 //! light, because what comes through it is the caustic's. Lights themselves are seen only where
-//! they are emissive surfaces.
+//! they are emissive surfaces. Glossy receivers show caustics and direct light, but do not mirror
+//! other surfaces.
 //!
 //! # Features
 //!
@@ -95,6 +96,7 @@ mod footprint_gather;
 mod footprint_kernel;
 mod footprint_piece;
 mod gbuffer;
+mod gloss;
 mod nearest;
 mod picture;
 mod pixel;
@@ -102,6 +104,7 @@ mod pixel_integral;
 mod screen;
 mod splat;
 mod splat_level;
+mod surroundings;
 mod thinning;
 
 pub use direct::DirectLight;

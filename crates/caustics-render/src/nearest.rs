@@ -1,5 +1,3 @@
-use std::f32::consts::FRAC_1_PI;
-
 use caustics_accel::{NearestScratch, PhotonTree};
 use caustics_filter::Kernel;
 use caustics_trace::Photon;
@@ -79,6 +77,17 @@ impl<'a> NearestEstimate<'a> {
     /// Irradiance at a point of a surface with unit `normal`, in W/m² for each channel, by the
     /// photons that arrive on the side of the normal.
     pub fn irradiance(&self, position: Vec3, normal: Vec3, scratch: &mut NearestScratch) -> Vec3 {
+        self.sum_over(position, normal, scratch, |photon| photon.flux)
+    }
+
+    /// What `part` makes of the photons around a point, over their area.
+    fn sum_over(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        scratch: &mut NearestScratch,
+        part: impl Fn(&Photon) -> Vec3,
+    ) -> Vec3 {
         let max_offset = MAX_PLANE_DISTANCE * self.max_radius;
         let accept = |index: u32| {
             let photon = &self.photons[index as usize];
@@ -108,16 +117,20 @@ impl<'a> NearestEstimate<'a> {
             // The farthest photon only sets the radius: counting it too would make a box kernel
             // too bright by one part in `count`.
             if relative < 1.0 {
-                sum += self.kernel.density(relative) * self.photons[neighbour.index as usize].flux;
+                let photon = &self.photons[neighbour.index as usize];
+                sum += self.kernel.density(relative) * part(photon);
             }
         }
         sum / radius_squared
     }
 
-    /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²).
+    /// Radiance that a receiver reflects towards the eye, in W/(sr m²): each photon's part by its own
+    /// direction.
     pub fn radiance(&self, receiver: &Receiver, scratch: &mut NearestScratch) -> Vec3 {
         let position = receiver.point.spawn.position;
-        receiver.albedo * FRAC_1_PI * self.irradiance(position, receiver.normal, scratch)
+        self.sum_over(position, receiver.normal, scratch, |photon| {
+            receiver.reflectance(-photon.incoming) * photon.flux
+        })
     }
 
     /// The farthest distance at which photons count, in metres.

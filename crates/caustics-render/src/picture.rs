@@ -14,13 +14,9 @@ use crate::gbuffer::GBuffer;
 use crate::nearest::NearestEstimate;
 use crate::pixel::PixelSamples;
 use crate::splat::splat;
-use crate::thinning::thin_wide;
 
 /// The largest width and height of a picture.
 const MAX_SIZE: u32 = 32_768;
-
-/// In how many footprints a point seen through glass or in a mirror lies, on the mean, at most.
-const OVERLAPS: f32 = 128.0;
 
 /// Through what the camera may see a caustic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -155,10 +151,7 @@ pub fn render<I: Intersect + ?Sized>(
             let (image, _) = splat(&buffer, photons, footprints)?;
             let gather = match options.visibility {
                 Visibility::Direct => None,
-                Visibility::Full => {
-                    let thinned = thin_wide(photons, footprints, OVERLAPS);
-                    Some(FootprintGather::new(&thinned, footprints)?)
-                }
+                Visibility::Full => Some(FootprintGather::new(photons, footprints)?),
             };
             (Some(image), gather)
         }

@@ -45,14 +45,18 @@ impl Screen {
         (point - self.eye).dot(self.forward)
     }
 
-    /// The cosine between a surface's normal and the direction to the eye, up to a positive factor.
-    pub(crate) fn facing(&self, point: Vec3, normal: Vec3) -> f32 {
-        let view = if self.is_perspective {
-            point - self.eye
+    /// The cosine between a surface's unit normal and the direction to the eye.
+    pub(crate) fn facing_cosine(&self, point: Vec3, normal: Vec3) -> f32 {
+        self.direction_to_eye(point).dot(normal)
+    }
+
+    /// The unit direction from a point to the eye.
+    pub(crate) fn direction_to_eye(&self, point: Vec3) -> Vec3 {
+        if self.is_perspective {
+            (self.eye - point).normalize_or_zero()
         } else {
-            self.forward
-        };
-        -view.dot(normal)
+            -self.forward
+        }
     }
 
     /// The pixel coordinates of a point in front of the camera; `None` behind it.
@@ -72,6 +76,30 @@ impl Screen {
             relative.dot(self.step_y) / self.step_y.length_squared(),
         );
         Some(self.center + scale * pixel)
+    }
+
+    /// The point of a plane, through `point` with unit `normal`, at pixel coordinates; `None` where
+    /// it is not in front of the camera.
+    pub(crate) fn on_plane(&self, pixel: Vec2, point: Vec3, normal: Vec3) -> Option<Vec3> {
+        let offset = pixel - self.center;
+        let step = offset.x * self.step_x + offset.y * self.step_y;
+        let (origin, direction) = if self.is_perspective {
+            (self.eye, self.forward + step)
+        } else {
+            (self.eye + step, self.forward)
+        };
+        let distance = (point - origin).dot(normal) / direction.dot(normal);
+        (distance > 0.0 && distance.is_finite()).then(|| origin + distance * direction)
+    }
+
+    /// The edges of a pixel on a surface at `point` that faces the view, in metres.
+    pub(crate) fn facing_axes(&self, point: Vec3) -> [Vec3; 2] {
+        let scale = if self.is_perspective {
+            self.depth(point)
+        } else {
+            1.0
+        };
+        [self.step_x, self.step_y].map(|step| scale * step)
     }
 
     /// How the point of a plane that a pixel sees moves with the pixel's two coordinates, in
@@ -136,6 +164,11 @@ mod tests {
                 ray.at(-ray.origin.dot(normal) / ray.direction.dot(normal))
             };
             let (x, y) = (350.0, 260.0);
+            let expected = on_plane(x, y);
+            let found = screen
+                .on_plane(Vec2::new(x, y), Vec3::ZERO, normal)
+                .unwrap();
+            assert!(found.abs_diff_eq(expected, 1e-4), "{found} {expected}");
             let [along_x, along_y] = screen.pixel_axes(on_plane(x, y), normal).unwrap();
             let central_x = 0.5 * (on_plane(x + 1.0, y) - on_plane(x - 1.0, y));
             let central_y = 0.5 * (on_plane(x, y + 1.0) - on_plane(x, y - 1.0));

@@ -10,7 +10,8 @@ use crate::footprint_kernel::FootprintKernel;
 use crate::gbuffer::{GBuffer, Texel};
 use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;
-use crate::splat_level::Level;
+use crate::splat_level::{Level, margin};
+use crate::surroundings::Surroundings;
 
 /// Photons that are prepared at a time, to bound the memory.
 const BATCH: usize = 1 << 17;
@@ -36,6 +37,11 @@ const INTEGRATED_SIGMA: f32 = 0.9;
 /// perspective bends it.
 const INTEGRATED_EXTENT: f32 = 48.0;
 
+/// The least cosine between the view and the normal of a footprint at which its blur serves for what
+/// stands before its plane, too. A plane that is seen edge-on blurs its footprints by a pixel that is
+/// long on the plane, but not on what stands before it.
+const LEAST_FACING: f32 = 0.3;
+
 /// What became of the photons that were splatted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SplatStats {
@@ -43,6 +49,8 @@ pub struct SplatStats {
     pub splatted: u64,
     /// Photons whose footprint lies outside the picture or behind the camera.
     pub outside: u64,
+    /// Photons whose footprint lies behind something else in the picture.
+    pub hidden: u64,
     /// Photons on a receiver that shows the camera its other side.
     pub turned_away: u64,
     /// Photons whose footprint is not a finite number.
@@ -63,33 +71,76 @@ pub fn splat(
     options: &FootprintOptions,
 ) -> Result<(Image, SplatStats), RenderError> {
     options.validate()?;
-    let mut levels: Vec<Level> = vec![Level::finest(buffer)];
-    while levels.len() < LEVELS {
-        let next = levels[levels.len() - 1].coarser();
-        levels.push(next);
+    let mut passes = vec![Pass::new(Level::finest(buffer, false))];
+    if buffer.is_glossy() {
+        passes.push(Pass::new(Level::finest(buffer, true)));
     }
+    let surroundings = Surroundings::of(buffer);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
-        let prepared = prepare(batch, &buffer.screen, options);
+        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options);
         for fate in &prepared {
             match fate {
                 Prepared::Splat(_) => stats.splatted += 1,
                 Prepared::Outside => stats.outside += 1,
+                Prepared::Hidden => stats.hidden += 1,
                 Prepared::TurnedAway => stats.turned_away += 1,
                 Prepared::Invalid => stats.invalid += 1,
             }
         }
-        for (number, level) in levels.iter_mut().enumerate() {
-            level.accumulate(&prepared, number);
+        prepared.extend(caught(batch, &buffer.screen, &surroundings, options));
+        for pass in &mut passes {
+            pass.accumulate(&prepared, &buffer.screen, &surroundings);
         }
     }
-    while let Some(coarse) = levels.pop() {
-        match levels.last_mut() {
-            Some(fine) => fine.add_coarser(&coarse),
-            None => return Ok((coarse.radiance()?, stats)),
+    let mut image = Image::new(buffer.width(), buffer.height())?;
+    for pass in passes {
+        pass.add_to(&mut image);
+    }
+    Ok((image, stats))
+}
+
+/// The texels that reflect in one way, at all levels that serve.
+struct Pass<'a> {
+    /// The finest first; at least one.
+    levels: Vec<Level<'a>>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(finest: Level<'a>) -> Self {
+        let coarser = finest.coarsest(LEVELS as u8 - 1);
+        let mut levels = vec![finest];
+        for level in 0..usize::from(coarser) {
+            levels.push(levels[level].coarser());
+        }
+        Self { levels }
+    }
+
+    fn accumulate(&mut self, prepared: &[Prepared], screen: &Screen, surroundings: &Surroundings) {
+        let coarsest = self.levels.len() as u8 - 1;
+        let refined;
+        let prepared = if usize::from(coarsest) + 1 < LEVELS {
+            refined = prepared
+                .iter()
+                .map(|one| one.refined(coarsest, screen))
+                .collect::<Vec<_>>();
+            &refined
+        } else {
+            prepared
+        };
+        for (number, level) in self.levels.iter_mut().enumerate() {
+            level.accumulate(prepared, surroundings, number);
         }
     }
-    Ok((Image::new(buffer.width(), buffer.height())?, stats))
+
+    fn add_to(mut self, image: &mut Image) {
+        while let Some(coarse) = self.levels.pop() {
+            match self.levels.last_mut() {
+                Some(fine) => fine.add_coarser(&coarse),
+                None => coarse.add_to(image),
+            }
+        }
+    }
 }
 
 /// A photon made ready for one level of the picture.
@@ -98,9 +149,14 @@ pub(crate) struct Splat {
     pub(crate) density: Density,
     pub(crate) gate: Gate,
     pub(crate) level: u8,
-    /// Whether a pixel's coordinates tell where it lies in the footprint; if not, every pixel of
-    /// the rows and columns is asked.
-    is_local: bool,
+    /// Whether a pixel's coordinates tell where in the footprint it sees the plane; if not, every
+    /// pixel of the rows and columns is asked.
+    is_linear: bool,
+    /// How far off the plane, in metres, is still in it: the pixels that see it are those that see
+    /// where its light meets the plane, to half a pixel.
+    pub(crate) flat: f32,
+    /// Whether it lights nothing but its receiver in its plane.
+    pub(crate) is_plain: bool,
     /// Middle, in pixels of the level.
     center: Vec2,
     /// What a step of one pixel of the level along x and y adds to the footprint's coordinates.
@@ -147,89 +203,194 @@ impl PixelIntegral {
     }
 }
 
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Prepared {
     Splat(Splat),
     Outside,
+    Hidden,
     TurnedAway,
     Invalid,
 }
 
-fn prepare(photons: &[Photon], screen: &Screen, options: &FootprintOptions) -> Vec<Prepared> {
+impl Prepared {
+    /// The same, on no coarser level than `coarsest`.
+    fn refined(&self, coarsest: u8, screen: &Screen) -> Self {
+        match self {
+            Self::Splat(splat) => Self::Splat(splat.refined(coarsest, screen)),
+            other => *other,
+        }
+    }
+}
+
+fn prepare(
+    photons: &[Photon],
+    screen: &Screen,
+    surroundings: &Surroundings,
+    options: &FootprintOptions,
+) -> Vec<Prepared> {
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;
         photons
             .par_iter()
             .with_min_len(1024)
-            .map(|photon| Splat::prepare(photon, screen, options))
+            .map(|photon| Splat::prepare(photon, screen, surroundings, options))
             .collect()
     }
     #[cfg(not(feature = "parallel"))]
     photons
         .iter()
-        .map(|photon| Splat::prepare(photon, screen, options))
+        .map(|photon| Splat::prepare(photon, screen, surroundings, options))
         .collect()
 }
 
+/// What other surfaces catch of photons whose plane is seen edge-on, or from behind.
+fn caught(
+    photons: &[Photon],
+    screen: &Screen,
+    surroundings: &Surroundings,
+    options: &FootprintOptions,
+) -> Vec<Prepared> {
+    let one = |photon: &Photon| {
+        Splat::before_plane(photon, screen, surroundings, options).map(Prepared::Splat)
+    };
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        photons
+            .par_iter()
+            .with_min_len(1024)
+            .filter_map(one)
+            .collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    photons.iter().filter_map(one).collect()
+}
+
 impl Splat {
-    fn prepare(photon: &Photon, screen: &Screen, options: &FootprintOptions) -> Prepared {
-        if screen.facing(photon.position, photon.normal) <= 0.0 {
+    /// What other surfaces catch, if the footprint's own splat does not tell.
+    fn before_plane(
+        photon: &Photon,
+        screen: &Screen,
+        surroundings: &Surroundings,
+        options: &FootprintOptions,
+    ) -> Option<Self> {
+        if screen.facing_cosine(photon.position, photon.normal) >= LEAST_FACING {
+            return None;
+        }
+        let pixel = screen.facing_axes(photon.position);
+        let density = Density::before_plane(photon, pixel, options)?;
+        let [_, gate] = density.gate().divided();
+        let bounds = Bounds::of(&density, [gate.before, gate.reach], screen).clipped(screen)?;
+        let in_reach = surroundings.in_reach(&density, &gate, bounds.low, bounds.high)?;
+        let bounds = Bounds::of(&density, in_reach.heights, screen).clipped(screen)?;
+        let [step_x, step_y] = pixel.map(|edge| Vec2::from(density.along(edge)));
+        let mut splat = Self {
+            gate,
+            density,
+            level: 0,
+            is_linear: false,
+            flat: 0.0,
+            is_plain: false,
+            center: Vec2::ZERO,
+            step_x,
+            step_y,
+            columns: [0; 2],
+            rows: [0; 2],
+            integral: None,
+        };
+        splat.choose_level(least_sigma(step_x, step_y));
+        splat.place(&bounds, screen);
+        Some(splat)
+    }
+
+    fn prepare(
+        photon: &Photon,
+        screen: &Screen,
+        surroundings: &Surroundings,
+        options: &FootprintOptions,
+    ) -> Prepared {
+        let facing = screen.facing_cosine(photon.position, photon.normal);
+        if facing <= 0.0 {
             return Prepared::TurnedAway;
         }
         let pixel = screen.pixel_axes(photon.position, photon.normal);
-        let Some(mut density) = Density::new(photon, pixel, options) else {
+        let Some(density) = Density::new(photon, pixel, options) else {
             return Prepared::Invalid;
         };
-        let bounds = Bounds::of(&density, screen);
-        let Some(bounds) = bounds.clipped(screen) else {
+        let mut gate = density.gate();
+        if facing < LEAST_FACING {
+            [gate, _] = gate.divided();
+        }
+        let reach = [-gate.plane_distance, gate.reach];
+        let Some(bounds) = Bounds::of(&density, reach, screen).clipped(screen) else {
             return Prepared::Outside;
+        };
+        let Some(in_reach) = surroundings.in_reach(&density, &gate, bounds.low, bounds.high) else {
+            return Prepared::Hidden;
         };
         let steps = pixel.map(|[x, y]| [density.along(x), density.along(y)].map(Vec2::from));
         let center = screen.project(photon.position);
-        let is_local = bounds.is_exact && steps.is_some() && center.is_some();
-        let integral = match (pixel, center) {
-            (Some(pixel), Some(center)) if is_local => {
-                PixelIntegral::of(photon, &pixel, center, options)
-            }
-            _ => None,
-        };
+        let plane = Bounds::of(&density, [0.0; 2], screen);
+        let is_linear = plane.is_exact && steps.is_some() && center.is_some();
         let ([step_x, step_y], center) = (steps.unwrap_or_default(), center.unwrap_or_default());
-        let sigma = if is_local {
+        let sigma = if is_linear {
             least_sigma(step_x, step_y)
         } else {
             f32::INFINITY
         };
-        if sigma < SMALL_SIGMA && integral.is_none() {
-            density.scale_by(normalisation(&density, center, step_x, step_y));
-        }
         let mut splat = Self {
-            gate: density.gate(),
+            gate,
             density,
             level: 0,
-            is_local,
+            is_linear,
+            flat: 0.0,
+            is_plain: false,
             center,
             step_x,
             step_y,
             columns: [0; 2],
             rows: [0; 2],
-            integral,
+            integral: None,
         };
-        if let Some(integral) = integral {
-            let extent = integral.gaussian.extent();
-            let (low, high) = (center - extent, center + extent);
-            splat.place(
-                &Bounds {
-                    low,
-                    high,
-                    is_exact: true,
-                },
-                screen,
-            );
-        } else {
-            splat.choose_level(sigma);
-            splat.place(&bounds, screen);
+        splat.choose_level(sigma);
+        splat.flat = 0.5 * splat.stride() / pixels_per_height(&splat.density, screen);
+        let is_flat = in_reach.heights.iter().all(|it| it.abs() <= splat.flat);
+        splat.is_plain = is_flat && in_reach.is_own;
+        if splat.is_linear && !surroundings.is_glossy {
+            splat.integral =
+                pixel.and_then(|pixel| PixelIntegral::of(photon, &pixel, center, options));
         }
+        if let Some(integral) = splat.integral {
+            let extent = integral.gaussian.extent();
+            let (low, high, is_exact) = (center - extent, center + extent, true);
+            let bounds = Bounds {
+                low,
+                high,
+                is_exact,
+            };
+            splat.place(&bounds, screen);
+            return Prepared::Splat(splat);
+        }
+        if sigma < SMALL_SIGMA {
+            let factor = normalisation(&splat.density, center, step_x, step_y);
+            splat.density.scale_by(factor);
+        }
+        let bounds = if is_flat {
+            plane
+        } else {
+            Bounds::of(&splat.density, in_reach.heights, screen)
+        };
+        let Some(bounds) = bounds.clipped(screen) else {
+            return Prepared::Outside;
+        };
+        splat.place(&bounds, screen);
         Prepared::Splat(splat)
+    }
+
+    /// Pixels of the picture along the sides of one of the level.
+    fn stride(&self) -> f32 {
+        STRIDE.pow(u32::from(self.level)) as f32
     }
 
     fn choose_level(&mut self, mut sigma: f32) {
@@ -243,23 +404,53 @@ impl Splat {
         }
     }
 
+    fn refined(&self, coarsest: u8, screen: &Screen) -> Self {
+        let mut finer = *self;
+        let halvings = self.level.saturating_sub(coarsest);
+        if halvings == 0 {
+            return finer;
+        }
+        let factor = STRIDE.pow(u32::from(halvings));
+        finer.level -= halvings;
+        let depth = u32::from(finer.level);
+        let (before, after) = (margin(u32::from(self.level)), margin(depth));
+        finer.center = (self.center - before as f32) * factor as f32 + after as f32;
+        finer.step_x /= factor as f32;
+        finer.step_y /= factor as f32;
+        finer.flat /= factor as f32;
+        // What is flat to half a pixel there need not be here.
+        finer.is_plain = false;
+        let widen = |[first, last]: [u16; 2], size: u32| {
+            let size = size.div_ceil(STRIDE.pow(depth)) as usize + 2 * after;
+            // What lies in the margin there may lie in that of any level.
+            let first = usize::from(first).saturating_sub(before) * factor as usize;
+            let last = usize::from(last) * factor as usize + after;
+            [first.min(size) as u16, last.min(size) as u16]
+        };
+        finer.columns = widen(self.columns, screen.width);
+        finer.rows = widen(self.rows, screen.height);
+        finer
+    }
+
     /// The pixels of the level whose middles may lie in the footprint.
     fn place(&mut self, bounds: &Bounds, screen: &Screen) {
-        let stride = STRIDE.pow(u32::from(self.level));
+        let depth = u32::from(self.level);
+        let (stride, margin) = (STRIDE.pow(depth), margin(depth) as f32);
         let range = |low: f32, high: f32, size: u32| {
-            let size = size.div_ceil(stride);
-            let first = (low / stride as f32 - 1.0).floor().max(0.0) as u32;
-            let last = (high / stride as f32 + 1.0).ceil().max(0.0) as u32;
-            [first.min(size) as u16, last.min(size) as u16]
+            let size = size.div_ceil(stride) as f32 + 2.0 * margin;
+            let first = (low / stride as f32 - 1.0).floor() + margin;
+            let last = (high / stride as f32 + 1.0).ceil() + margin;
+            [first, last].map(|end| end.clamp(0.0, size) as u16)
         };
         self.columns = range(bounds.low.x, bounds.high.x, screen.width);
         self.rows = range(bounds.low.y, bounds.high.y, screen.height);
+        self.center += margin;
     }
 
     /// The pixels of a row whose middles lie in the footprint.
     pub(crate) fn span(&self, row: usize) -> Range<usize> {
         let [first, last] = self.columns.map(usize::from);
-        if !self.is_local {
+        if !self.is_linear {
             return first..last;
         }
         // |x step_x + y step_y|² = cut, for the x of the ends.
@@ -280,24 +471,45 @@ impl Splat {
         low..high
     }
 
-    /// What the photon adds to the irradiance of a texel, whose pixel gets `weight` of its flux
-    /// where it is integrated.
+    /// What the photon adds to the irradiance of a texel whose pixel gets `weight` of its flux.
     #[inline]
-    pub(crate) fn irradiance(&self, texel: &Texel, weight: Option<f32>) -> Vec3 {
-        if self
-            .gate
-            .admits(&self.density, texel.position, texel.normal)
-        {
-            match (&self.integral, weight) {
-                (Some(integral), Some(weight)) => {
-                    let cosine = (-texel.normal.dot(self.density.incoming)).max(0.0);
-                    integral.strength * (cosine * weight)
-                }
-                _ => self.density.irradiance(texel.position, texel.normal),
-            }
+    pub(crate) fn integrated(&self, integral: &PixelIntegral, texel: &Texel, weight: f32) -> Vec3 {
+        if self.admits(texel) {
+            let cosine = (-texel.normal.dot(self.density.incoming)).max(0.0);
+            integral.strength * (cosine * weight)
         } else {
             Vec3::ZERO
         }
+    }
+
+    fn admits(&self, texel: &Texel) -> bool {
+        self.gate.admits(
+            &self.density,
+            texel.position,
+            texel.normal,
+            Some(texel.object),
+        )
+    }
+
+    /// What the photon adds to the irradiance of a texel.
+    #[inline]
+    pub(crate) fn irradiance(&self, texel: &Texel) -> Vec3 {
+        if self.admits(texel) {
+            self.density.irradiance(texel.position, texel.normal)
+        } else {
+            Vec3::ZERO
+        }
+    }
+}
+
+/// How far, in pixels, what lies a metre before a footprint's plane is seen from where its light
+/// meets the plane; infinite where that cannot be seen.
+fn pixels_per_height(density: &Density, screen: &Screen) -> f32 {
+    let height = 0.1 * density.radius();
+    let shifted = screen.project(density.center + height * density.towards_light());
+    match (screen.project(density.center), shifted) {
+        (Some(from), Some(to)) => from.distance(to) / height,
+        _ => f32::INFINITY,
     }
 }
 
@@ -350,19 +562,35 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(density: &Density, screen: &Screen) -> Self {
+    /// Of what a footprint lights between two heights before its plane.
+    fn of(density: &Density, heights: [f32; 2], screen: &Screen) -> Self {
         let [a, b] = density.half_extents();
+        let [below, above] = heights.map(|height| height * density.towards_light());
         // A perspective map takes the corners' hull to the corners' hull as long as all are in
         // front of the camera; close to it the map is too uneven to be followed linearly.
         let near = 0.3 * screen.depth(density.center).abs();
         let corners = [a + b, a - b, b - a, -a - b].map(|corner| density.center + corner);
-        if corners.iter().all(|&corner| screen.depth(corner) > near)
-            && let [Some(p), Some(q), Some(r), Some(s)] =
-                corners.map(|corner| screen.project(corner))
-        {
+        let hull = |shift: Vec3| {
+            let corners = corners.map(|corner| corner + shift);
+            if corners.iter().any(|&corner| screen.depth(corner) <= near) {
+                return None;
+            }
+            let [p, q, r, s] = corners.map(|corner| screen.project(corner));
+            let (p, q, r, s) = (p?, q?, r?, s?);
+            Some((p.min(q).min(r).min(s), p.max(q).max(r).max(s)))
+        };
+        let hulls = hull(below).and_then(|lower| {
+            let upper = if heights[0] == heights[1] {
+                lower
+            } else {
+                hull(above)?
+            };
+            Some((lower.0.min(upper.0), lower.1.max(upper.1)))
+        });
+        if let Some((low, high)) = hulls {
             return Self {
-                low: p.min(q).min(r).min(s),
-                high: p.max(q).max(r).max(s),
+                low,
+                high,
                 is_exact: true,
             };
         }

@@ -1,37 +1,67 @@
 use std::f32::consts::FRAC_1_PI;
-use std::ops::Range;
 
 use caustics_filter::Image;
 use glam::{Vec2, Vec3};
+use std::ops::Range;
 
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
-use crate::error::RenderError;
 use crate::gbuffer::{GBuffer, Texel};
+use crate::gloss::GlossyTexels;
 use crate::splat::{PixelIntegral, Prepared, STRIDE, Splat};
+use crate::surroundings::{Relation, Surroundings, TILE};
 
 /// Rows of one task.
 const BAND: usize = 16;
 
-/// The irradiance of a picture's texels at one resolution.
-pub(crate) struct Level {
+/// Pixels that a coarser level has beyond the picture, on every side.
+const MARGIN: usize = 1;
+
+/// Pixels that a level has beyond the picture, on every side.
+pub(crate) fn margin(depth: u32) -> usize {
+    if depth == 0 { 0 } else { MARGIN }
+}
+
+/// What a level's texels are lit as.
+enum Reflection {
+    /// Lambertian ones take irradiance; the picture makes radiance of it in the end.
+    Lambertian,
+    /// Glossy ones take radiance towards the eye.
+    Glossy(GlossyTexels),
+}
+
+/// The irradiance of a picture's texels at one resolution, or of glossy ones the radiance.
+pub(crate) struct Level<'a> {
+    buffer: &'a GBuffer,
+    reflection: Reflection,
+    /// With the margin.
     width: usize,
     height: usize,
+    /// How often the picture was halved.
+    depth: u32,
     texels: Vec<Option<Texel>>,
     columns: TexelColumns,
-    irradiance: Columns,
+    light: Columns,
     extras: Vec<(u32, Texel)>,
-    extra_irradiance: Vec<Vec3>,
+    extra_light: Vec<Vec3>,
     /// For each band, where its extras start; one more than there are bands.
     extra_starts: Vec<usize>,
 }
 
-impl Level {
-    pub(crate) fn new(
-        width: usize,
-        height: usize,
+impl<'a> Level<'a> {
+    fn new(
+        buffer: &'a GBuffer,
+        [width, height]: [usize; 2],
+        depth: u32,
         texels: Vec<Option<Texel>>,
         extras: Vec<(u32, Texel)>,
+        is_glossy: bool,
     ) -> Self {
+        let (reflection, columns) = if is_glossy {
+            let glossy = GlossyTexels::new(&texels, &extras, buffer);
+            (Reflection::Glossy(glossy), TexelColumns::default())
+        } else {
+            (Reflection::Lambertian, TexelColumns::new(&texels))
+        };
         let bands = height.div_ceil(BAND);
         let extra_starts = (0..=bands)
             .map(|band| {
@@ -39,61 +69,130 @@ impl Level {
             })
             .collect();
         Self {
+            buffer,
+            reflection,
             width,
             height,
-            irradiance: Columns::zero(texels.len()),
-            columns: TexelColumns::new(&texels),
+            depth,
+            light: Columns::zero(texels.len()),
+            columns,
             texels,
-            extra_irradiance: vec![Vec3::ZERO; extras.len()],
+            extra_light: vec![Vec3::ZERO; extras.len()],
             extras,
             extra_starts,
         }
     }
 
-    pub(crate) fn finest(buffer: &GBuffer) -> Self {
-        Self::new(
-            buffer.width() as usize,
-            buffer.height() as usize,
-            buffer.texels.clone(),
-            buffer.extras.clone(),
-        )
+    /// The pixels themselves, as far as their texels are Lambertian, or glossy.
+    pub(crate) fn finest(buffer: &'a GBuffer, is_glossy: bool) -> Self {
+        let (texels, extras) = if buffer.is_glossy() {
+            let is_wanted = |texel: &Texel| buffer.brdf(texel).is_lambertian() != is_glossy;
+            let (texels, extras) = (buffer.texels.iter(), buffer.extras.iter());
+            (
+                texels.map(|texel| texel.filter(is_wanted)).collect(),
+                extras.filter(|(_, it)| is_wanted(it)).copied().collect(),
+            )
+        } else {
+            (buffer.texels.clone(), buffer.extras.clone())
+        };
+        let size = [buffer.width(), buffer.height()].map(|size| size as usize);
+        Self::new(buffer, size, 0, texels, extras, is_glossy)
     }
 
-    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle,
-    /// moved to the middle of those on the same surface: what is found there is taken to be the
-    /// light in the block's middle.
+    /// Up to which coarser level, at most `limit`, light may be drawn and interpolated from.
+    pub(crate) fn coarsest(&self, limit: u8) -> u8 {
+        match &self.reflection {
+            Reflection::Lambertian => limit,
+            Reflection::Glossy(texels) => texels.halvings(self.width, limit),
+        }
+    }
+
+    /// The level whose pixels stand for blocks of this one's, each by the texel nearest its middle.
+    ///
+    /// Its texels lie where the block's middle sees their plane, also where only a part of the
+    /// block sees it, or where the block ends outside the picture. A margin of one pixel around
+    /// continues what is seen at the border, so that the picture's outermost pixels have something
+    /// to be interpolated from on either side.
     pub(crate) fn coarser(&self) -> Self {
         let stride = STRIDE as usize;
-        let (width, height) = (self.width.div_ceil(stride), self.height.div_ceil(stride));
-        let texels = (0..width * height)
+        let size @ [width, height] = self.inner().map(|size| size.div_ceil(stride));
+        let blocks: Vec<Option<Texel>> = (0..width * height)
+            .map(|index| self.block(index % width, index / width))
+            .collect();
+        let (depth, padded) = (self.depth + 1, size.map(|size| size + 2 * MARGIN));
+        let texels = (0..padded[0] * padded[1])
             .map(|index| {
-                let (x0, y0) = (index % width * stride, index / width * stride);
-                let middle = (stride as f32 - 1.0) * 0.5;
-                let inside = (0..stride * stride).filter_map(|it| {
-                    let (dx, dy) = (it % stride, it / stride);
-                    let (x, y) = (x0 + dx, y0 + dy);
-                    let texel = (x < self.width && y < self.height)
-                        .then(|| self.texels[y * self.width + x])
-                        .flatten()?;
-                    let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
-                    Some((off, texel))
-                });
-                let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
-                let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
-                let (sum, count) = alike.fold((Vec3::ZERO, 0.0), |(sum, count), (_, texel)| {
-                    (sum + texel.position, count + 1.0)
-                });
-                Some(Texel {
-                    position: sum / count,
-                    ..nearest
-                })
+                let (x, y) = (index % padded[0], index / padded[0]);
+                let nearest = |at: usize, size: usize| at.clamp(MARGIN, size) - MARGIN;
+                let inside = (nearest(x, width), nearest(y, height));
+                let texel = blocks[inside.1 * width + inside.0]?;
+                if (inside.0 + MARGIN, inside.1 + MARGIN) == (x, y) {
+                    return Some(texel);
+                }
+                let middle = Vec2::new(x as f32, y as f32) + 0.5 - MARGIN as f32;
+                self.moved(texel, middle, depth)
             })
             .collect();
-        Self::new(width, height, texels, Vec::new())
+        let is_glossy = matches!(self.reflection, Reflection::Glossy(_));
+        Self::new(self.buffer, padded, depth, texels, Vec::new(), is_glossy)
+    }
+
+    /// The texel of a block of the next level.
+    fn block(&self, x: usize, y: usize) -> Option<Texel> {
+        let stride = STRIDE as usize;
+        let [width, height] = self.inner();
+        let middle = (stride as f32 - 1.0) * 0.5;
+        let inside = (0..stride * stride).filter_map(|it| {
+            let (dx, dy) = (it % stride, it / stride);
+            let (x, y) = (x * stride + dx, y * stride + dy);
+            let index = (y + self.margin()) * self.width + x + self.margin();
+            let texel = (x < width && y < height)
+                .then(|| self.texels[index])
+                .flatten()?;
+            let off = Vec2::new(dx as f32 - middle, dy as f32 - middle).length_squared();
+            Some((off, texel))
+        });
+        let (_, nearest) = inside.clone().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let alike = inside.filter(|(_, texel)| texel.is_like(&nearest));
+        let (sum, count) = alike.fold((Vec3::ZERO, 0), |(sum, count), (_, texel)| {
+            (sum + texel.position, count + 1)
+        });
+        let middle = Texel {
+            position: sum / count as f32,
+            ..nearest
+        };
+        if count == stride * stride {
+            return Some(middle);
+        }
+        let at = Vec2::new(x as f32, y as f32) + 0.5;
+        self.moved(middle, at, self.depth + 1).or(Some(middle))
+    }
+
+    /// A texel moved in its plane to where the pixel coordinates of a level see it.
+    fn moved(&self, texel: Texel, at: Vec2, depth: u32) -> Option<Texel> {
+        let pixel = at * STRIDE.pow(depth) as f32;
+        let screen = &self.buffer.screen;
+        let position = screen.on_plane(pixel, texel.position, texel.normal)?;
+        Some(Texel { position, ..texel })
+    }
+
+    /// Pixels around those of the picture.
+    fn margin(&self) -> usize {
+        margin(self.depth)
+    }
+
+    /// Width and height without the margin.
+    fn inner(&self) -> [usize; 2] {
+        [self.width, self.height].map(|size| size - 2 * self.margin())
     }
 
     /// Adds the splats of this level.
-    pub(crate) fn accumulate(&mut self, prepared: &[Prepared], level: usize) {
+    pub(crate) fn accumulate(
+        &mut self,
+        prepared: &[Prepared],
+        surroundings: &Surroundings,
+        level: usize,
+    ) {
         let bands = self.height.div_ceil(BAND);
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
         for (index, item) in prepared.iter().enumerate() {
@@ -108,20 +207,24 @@ impl Level {
                 }
             }
         }
-        let mut extra_rest = self.extra_irradiance.as_mut_slice();
+        let mut extra_rest = self.extra_light.as_mut_slice();
         let mut tasks = Vec::with_capacity(bands);
-        for (number, irradiance) in self.irradiance.chunks_mut(BAND * self.width).enumerate() {
+        for (number, light) in self.light.chunks_mut(BAND * self.width).enumerate() {
             let extras = self.extra_starts[number]..self.extra_starts[number + 1];
-            let (extra_irradiance, rest) = extra_rest.split_at_mut(extras.len());
+            let (extra_light, rest) = extra_rest.split_at_mut(extras.len());
             extra_rest = rest;
             tasks.push(BandTask {
                 first_row: number * BAND,
                 width: self.width,
+                depth: self.depth,
+                surroundings,
+                reflection: &self.reflection,
                 texels: &self.texels,
                 columns: &self.columns,
-                irradiance,
+                light,
+                first_extra: extras.start,
                 extras: &self.extras[extras],
-                extra_irradiance,
+                extra_light,
                 splats: &lists[number],
             });
         }
@@ -141,35 +244,35 @@ impl Level {
 
     pub(crate) fn add_coarser(&mut self, coarse: &Self) {
         let stride = STRIDE as f32;
-        let width = self.width;
+        let (width, margin) = (self.width, self.margin() as f32);
         let place = |pixel: usize| {
             let (x, y) = (pixel % width, pixel / width);
-            (Vec2::new(x as f32, y as f32) + 0.5) / stride - 0.5
+            (Vec2::new(x as f32, y as f32) + 0.5 - margin) / stride - 0.5 + MARGIN as f32
         };
         if coarse.is_dark() {
             return;
         }
         for (pixel, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                let sum = self.irradiance.get(pixel) + coarse.interpolate(place(pixel), texel);
-                self.irradiance.set(pixel, sum);
+                let sum = self.light.get(pixel) + coarse.interpolate(place(pixel), texel);
+                self.light.set(pixel, sum);
             }
         }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&mut self.extra_irradiance) {
-            *irradiance += coarse.interpolate(place(*pixel as usize), texel);
+        for ((pixel, texel), light) in self.extras.iter().zip(&mut self.extra_light) {
+            *light += coarse.interpolate(place(*pixel as usize), texel);
         }
     }
 
     fn is_dark(&self) -> bool {
-        self.irradiance
+        self.light
             .x
             .iter()
-            .chain(&self.irradiance.y)
-            .chain(&self.irradiance.z)
+            .chain(&self.light.y)
+            .chain(&self.light.z)
             .all(|&it| it == 0.0)
     }
 
-    /// The irradiance between the middles of pixels, from those that see the same surface.
+    /// The light between the middles of pixels, from those that see the same surface.
     fn interpolate(&self, at: Vec2, texel: &Texel) -> Vec3 {
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
         // The four around the point; where none sees the surface, the next ones out.
@@ -191,7 +294,7 @@ impl Level {
                     }
                     let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
                     let weight = tent.x * tent.y;
-                    sum += weight * self.irradiance.get(index);
+                    sum += weight * self.light.get(index);
                     weights += weight;
                 }
             }
@@ -202,19 +305,27 @@ impl Level {
         Vec3::ZERO
     }
 
-    pub(crate) fn radiance(&self) -> Result<Image, RenderError> {
-        let mut image = Image::new(self.width as u32, self.height as u32)?;
+    /// Adds the radiance of all texels to a picture.
+    pub(crate) fn add_to(&self, image: &mut Image) {
         let pixels = image.pixels_mut();
+        let mut add = |pixel: usize, texel: &Texel, light: Vec3| {
+            let reflected = match self.reflection {
+                Reflection::Lambertian => {
+                    FRAC_1_PI * (self.buffer.brdf(texel).base() * texel.coverage)
+                }
+                Reflection::Glossy(_) => Vec3::splat(texel.coverage),
+            };
+            let sum = Vec3::from(pixels[pixel]) + reflected * light;
+            pixels[pixel] = sum.to_array();
+        };
         for (index, texel) in self.texels.iter().enumerate() {
             if let Some(texel) = texel {
-                pixels[index] = (FRAC_1_PI * texel.albedo * self.irradiance.get(index)).to_array();
+                add(index, texel, self.light.get(index));
             }
         }
-        for ((pixel, texel), irradiance) in self.extras.iter().zip(&self.extra_irradiance) {
-            let pixel = &mut pixels[*pixel as usize];
-            *pixel = (Vec3::from(*pixel) + FRAC_1_PI * texel.albedo * *irradiance).to_array();
+        for ((pixel, texel), light) in self.extras.iter().zip(&self.extra_light) {
+            add(*pixel as usize, texel, *light);
         }
-        Ok(image)
     }
 }
 
@@ -222,18 +333,22 @@ impl Level {
 struct BandTask<'a> {
     first_row: usize,
     width: usize,
+    depth: u32,
+    surroundings: &'a Surroundings,
+    reflection: &'a Reflection,
     texels: &'a [Option<Texel>],
     columns: &'a TexelColumns,
     /// From the band's first row on.
-    irradiance: ColumnsMut<'a>,
+    light: ColumnsMut<'a>,
+    first_extra: usize,
     extras: &'a [(u32, Texel)],
-    extra_irradiance: &'a mut [Vec3],
+    extra_light: &'a mut [Vec3],
     splats: &'a [u32],
 }
 
 impl BandTask<'_> {
     fn run(mut self, prepared: &[Prepared]) {
-        let rows = self.irradiance.x.len() / self.width;
+        let rows = self.light.x.len() / self.width;
         let mut weights = Vec::new();
         for &index in self.splats {
             let Prepared::Splat(splat) = &prepared[index as usize] else {
@@ -245,17 +360,12 @@ impl BandTask<'_> {
                 self.light_integrated(splat, integral, first..last, &mut weights);
                 continue;
             }
-            for row in first..last {
-                let span = splat.span(row);
-                let start = (row - self.first_row) * self.width;
-                self.columns.light(
-                    &splat.density,
-                    &splat.gate,
-                    row * self.width + span.start,
-                    span.len(),
-                    &mut self.irradiance,
-                    start + span.start,
-                );
+            if splat.is_plain {
+                for row in first..last {
+                    self.light(splat, row, splat.span(row), Relation::Flat);
+                }
+            } else {
+                self.light_by_tiles(splat, first..last);
             }
             if !self.extras.is_empty() && first < last {
                 let low = (first * self.width) as u32;
@@ -268,7 +378,8 @@ impl BandTask<'_> {
                     }
                     let column = pixel % self.width as u32;
                     if (columns[0]..columns[1]).contains(&column) {
-                        self.extra_irradiance[begin + offset] += splat.irradiance(texel, None);
+                        self.extra_light[begin + offset] +=
+                            self.extra(splat, begin + offset, texel);
                     }
                 }
             }
@@ -297,10 +408,8 @@ impl BandTask<'_> {
                     && let Some(texel) = &self.texels[start + column]
                 {
                     let target = (row - self.first_row) * self.width + column;
-                    let added = splat.irradiance(texel, Some(weight));
-                    self.irradiance.x[target] += added.x;
-                    self.irradiance.y[target] += added.y;
-                    self.irradiance.z[target] += added.z;
+                    self.light
+                        .add(target, splat.integrated(integral, texel, weight));
                 }
             }
         }
@@ -313,7 +422,94 @@ impl BandTask<'_> {
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
             if columns.contains(&column) {
                 let place = (row - rows.start) * columns.len() + column - columns.start;
-                self.extra_irradiance[index] += splat.irradiance(texel, Some(weights[place]));
+                self.extra_light[index] += splat.integrated(integral, texel, weights[place]);
+            }
+        }
+    }
+
+    /// Lights rows of the band tile by tile, each by what it is to the splat.
+    fn light_by_tiles(&mut self, splat: &Splat, rows: Range<usize>) {
+        let margin = margin(self.depth);
+        let tile_of = |pixel: usize| pixel.saturating_sub(margin) / TILE;
+        let [first, last] = splat.columns.map(usize::from);
+        if first >= last {
+            return;
+        }
+        // Columns where something of the same kind begins and ends.
+        let mut runs: Vec<(Range<usize>, Relation)> = Vec::new();
+        let mut tile_row = usize::MAX;
+        for row in rows {
+            if tile_of(row) != tile_row {
+                tile_row = tile_of(row);
+                runs.clear();
+                for column in tile_of(first)..=tile_of(last - 1) {
+                    let place = [column, tile_row];
+                    let relation = self.surroundings.relation(
+                        self.depth,
+                        place,
+                        &splat.density,
+                        &splat.gate,
+                        splat.flat,
+                    );
+                    let end = ((column + 1) * TILE + margin).min(last);
+                    match runs.last_mut() {
+                        Some((run, known)) if *known == relation => run.end = end,
+                        Some((run, _)) => {
+                            let begin = run.end;
+                            runs.push((begin..end, relation));
+                        }
+                        None => runs.push((first..end, relation)),
+                    }
+                }
+                // The margin belongs to the last tile.
+                if let Some((run, _)) = runs.last_mut() {
+                    run.end = last;
+                }
+            }
+            for (run, relation) in &runs {
+                let columns = match relation {
+                    Relation::Dark => continue,
+                    Relation::Flat => {
+                        let span = splat.span(row);
+                        span.start.max(run.start)..span.end.min(run.end)
+                    }
+                    Relation::Own | Relation::Mixed => run.clone(),
+                };
+                self.light(splat, row, columns, *relation);
+            }
+        }
+    }
+
+    /// Lights some columns of a row.
+    fn light(&mut self, splat: &Splat, row: usize, columns: Range<usize>, relation: Relation) {
+        if columns.is_empty() {
+            return;
+        }
+        let count = columns.len();
+        let from = row * self.width + columns.start;
+        let to = (row - self.first_row) * self.width + columns.start;
+        let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
+        match self.reflection {
+            Reflection::Lambertian if relation != Relation::Mixed => {
+                self.columns.light(density, gate, from, count, light, to);
+            }
+            Reflection::Lambertian => {
+                for (index, texel) in (to..).zip(&self.texels[from..from + count]) {
+                    if let Some(texel) = texel {
+                        light.add(index, splat.irradiance(texel));
+                    }
+                }
+            }
+            Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
+        }
+    }
+
+    /// What a splat adds to an extra texel of the band.
+    fn extra(&self, splat: &Splat, extra: usize, texel: &Texel) -> Vec3 {
+        match self.reflection {
+            Reflection::Lambertian => splat.irradiance(texel),
+            Reflection::Glossy(texels) => {
+                texels.extra_radiance(self.first_extra + extra, &splat.density, &splat.gate)
             }
         }
     }

@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::f32::consts::PI;
 
 use caustics_trace::Photon;
@@ -14,21 +15,21 @@ const BINS_PER_OCTAVE: i32 = 4;
 const OCTAVES: i32 = 48;
 
 /// Photons of which wide footprints are few enough that a point of the scene lies in about
-/// `overlaps` of them at most.
+/// [`FootprintOptions::max_overlaps`] of them at most.
 ///
 /// Chains of inner reflections spread a little light over the whole scene, from so many photons
 /// that each point would have to look at thousands. Of the footprints that are wider than a common
 /// area, found so that the mean comes out, every one stands for several: along the order of the
 /// photons, which is that of the lattice, each survives in proportion to its area's inverse, with
 /// as much more flux (systematic sampling). No flux is lost but the last photon's part.
-pub(crate) fn thin_wide(
-    photons: &[Photon],
+pub(crate) fn thin_wide<'a>(
+    photons: &'a [Photon],
     options: &FootprintOptions,
-    overlaps: f32,
-) -> Vec<Photon> {
+) -> Cow<'a, [Photon]> {
     let scene = busy_area(photons);
-    if !(scene > 0.0 && scene.is_finite()) {
-        return photons.to_vec();
+    let budget = options.max_overlaps * scene;
+    if !(scene > 0.0 && budget.is_finite()) {
+        return Cow::Borrowed(photons);
     }
     let reach = options.scale * options.kernel.reach();
     let area = |photon: &Photon| {
@@ -36,7 +37,10 @@ pub(crate) fn thin_wide(
         let squared = a.length_squared() + b.length_squared();
         (PI * reach * reach * squared).min(scene)
     };
-    let limit = common_area(photons.iter().map(area), scene, overlaps * scene);
+    let limit = common_area(photons.iter().map(area), scene, budget);
+    if limit >= scene {
+        return Cow::Borrowed(photons);
+    }
     let mut due = 0.5;
     photons
         .iter()
@@ -127,8 +131,11 @@ mod tests {
     #[test]
     fn wide_footprints_become_few_and_keep_their_flux() {
         let all = photons();
-        let options = FootprintOptions::default();
-        let thinned = thin_wide(&all, &options, 100.0);
+        let options = FootprintOptions {
+            max_overlaps: 100.0,
+            ..FootprintOptions::default()
+        };
+        let thinned = thin_wide(&all, &options);
         let is_wide = |photon: &&Photon| photon.axes[0].x > 1.0;
         // Narrow footprints stay as they are.
         assert_eq!(thinned.iter().filter(|it| !is_wide(it)).count(), 5000);
@@ -151,7 +158,13 @@ mod tests {
     #[test]
     fn with_room_enough_nothing_changes() {
         let all = photons();
-        assert_eq!(thin_wide(&all, &FootprintOptions::default(), 1e6), all);
-        assert_eq!(thin_wide(&[], &FootprintOptions::default(), 10.0), []);
+        for max_overlaps in [1e6, f32::INFINITY] {
+            let options = FootprintOptions {
+                max_overlaps,
+                ..FootprintOptions::default()
+            };
+            assert_eq!(*thin_wide(&all, &options), all);
+            assert_eq!(*thin_wide(&[], &options), []);
+        }
     }
 }

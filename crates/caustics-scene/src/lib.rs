@@ -39,6 +39,7 @@
 //! | type | what |
 //! | --- | --- |
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
+//! | [`Brdf`] | how receivers reflect: Lambertian, or glTF's metallic-roughness model |
 //! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, discs and balls that shine |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
@@ -58,10 +59,13 @@
 //! Nested bodies by priority: Schmidt and Budge, "Simple nested dielectrics in ray traced images",
 //! 2002. Spot falloff: `KHR_lights_punctual`. Absorption: Beer and Lambert's law as in
 //! `KHR_materials_volume`. Change of interpolated normals: Igehy, "Tracing ray differentials", 1999.
+//! Glossy reflection: glTF 2.0, appendix B; Walter et al., "Microfacet models for refraction through
+//! rough surfaces", 2007; Heitz, "Understanding the masking-shadowing function in microfacet-based
+//! BRDFs", 2014; Ashikhmin and Shirley, "An anisotropic Phong BRDF model", 2000.
 //! Splines of the built-in glass: Farin, "Curves and surfaces for CAGD", chapter 9.
 //!
 //! # Limits
-//! No textures, rough specular surfaces, skins or animations; `World` copies the triangles of every
+//! No textures, rough glass, skins or animations; rough metal receives caustics and throws none; `World` copies the triangles of every
 //! instance. Spheres are tested one by one, and meant for few.
 //!
 //! # Features
@@ -69,6 +73,7 @@
 //! several threads.
 
 mod area_light;
+mod brdf;
 pub mod builtin;
 mod camera;
 #[cfg(feature = "gltf")]
@@ -84,6 +89,7 @@ mod surface_point;
 mod world;
 
 pub use area_light::AreaLight;
+pub use brdf::Brdf;
 pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
 pub use instanced::InstancedIntersector;

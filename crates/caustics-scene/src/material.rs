@@ -1,5 +1,6 @@
 //! What surfaces do with light.
 
+use crate::brdf::Brdf;
 use glam::Vec3;
 use thiserror::Error;
 
@@ -16,6 +17,18 @@ pub enum Surface {
     Diffuse {
         /// Fraction of light reflected, linear RGB, each in [0, 1].
         albedo: Vec3,
+    },
+    /// A Lambertian base under a layer of microscopic mirrors, or a rough metal, as in glTF's
+    /// metallic-roughness model: see [`Brdf::metallic_roughness`]. Receivers of caustics, like
+    /// [`Diffuse`](Self::Diffuse) ones; they throw none.
+    Glossy {
+        /// Colour of the base, and of the mirrors as far as they are metal; linear RGB, each in
+        /// [0, 1].
+        base_color: Vec3,
+        /// From 0, plastic or paint, to 1, bare metal.
+        metallic: f32,
+        /// From 0, a polish, to 1. Below 0.04 it reflects as with 0.04.
+        roughness: f32,
     },
     /// The smooth boundary of a clear body, such as glass or water. The body lies on the side that
     /// the geometric normals point away from.
@@ -45,6 +58,20 @@ impl Surface {
     #[must_use]
     pub const fn is_specular(&self) -> bool {
         matches!(self, Self::Dielectric { .. } | Self::Metal { .. })
+    }
+
+    /// How the surface reflects light into all directions; `None` where it is specular.
+    #[must_use]
+    pub fn brdf(&self) -> Option<Brdf> {
+        match *self {
+            Self::Diffuse { albedo } => Some(Brdf::lambertian(albedo)),
+            Self::Glossy {
+                base_color,
+                metallic,
+                roughness,
+            } => Some(Brdf::metallic_roughness(base_color, metallic, roughness)),
+            Self::Dielectric { .. } | Self::Metal { .. } => None,
+        }
     }
 }
 
@@ -96,6 +123,23 @@ impl Material {
                 albedo: albedo.into(),
             },
         )
+    }
+
+    /// A glossy surface, as glTF's of this base colour, metallicity and roughness.
+    #[must_use]
+    pub fn glossy(
+        name: impl Into<String>,
+        base_color: impl Into<Vec3>,
+        metallic: f32,
+        roughness: f32,
+    ) -> Self {
+        let base_color = base_color.into();
+        let surface = Surface::Glossy {
+            base_color,
+            metallic,
+            roughness,
+        };
+        Self::new(name, surface)
     }
 
     /// A colourless dielectric of priority 0.
@@ -175,6 +219,15 @@ impl Material {
     pub fn validate(&self) -> Result<(), MaterialError> {
         match self.surface {
             Surface::Diffuse { albedo } => fraction("albedo", albedo)?,
+            Surface::Glossy {
+                base_color,
+                metallic,
+                roughness,
+            } => {
+                fraction("base colour", base_color)?;
+                fraction("metallicity", Vec3::splat(metallic))?;
+                fraction("roughness", Vec3::splat(roughness))?;
+            }
             Surface::Metal { f0 } => fraction("reflectance", f0)?,
             Surface::Dielectric {
                 ior,
@@ -218,12 +271,12 @@ fn within(quantity: &'static str, value: Vec3, limit: f32) -> Result<(), Materia
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum MaterialError {
-    /// A colour channel outside its range, or not a number.
+    /// A number, or a channel of a colour, outside its range, or not a number.
     #[error("{quantity} {value} is not between 0 and {limit}")]
     OutOfRange {
         /// What it is the value of.
         quantity: &'static str,
-        /// The offending channel.
+        /// The offending number.
         value: f32,
         /// The largest value allowed.
         limit: f32,
@@ -277,7 +330,12 @@ mod tests {
                 .surface
                 .is_specular()
         );
-        assert!(!Material::diffuse("chalk", [0.8; 3]).surface.is_specular());
+        let chalk = Material::diffuse("chalk", [0.8; 3]).surface;
+        let steel = Material::glossy("steel", [0.6; 3], 1.0, 0.3).surface;
+        assert!(!chalk.is_specular() && !steel.is_specular());
+        assert!(chalk.brdf().is_some_and(|brdf| brdf.is_lambertian()));
+        assert!(steel.brdf().is_some_and(|brdf| !brdf.is_lambertian()));
+        assert_eq!(Material::dielectric("glass", 1.5).surface.brdf(), None);
     }
 
     #[test]
@@ -299,6 +357,16 @@ mod tests {
         assert_eq!(
             nan.unwrap_err().to_string(),
             "reflectance NaN is not between 0 and 1"
+        );
+        let rough = Material::glossy("too rough", [0.5; 3], 0.0, 1.5).validate();
+        assert_eq!(
+            rough.unwrap_err().to_string(),
+            "roughness 1.5 is not between 0 and 1"
+        );
+        assert!(
+            Material::glossy("undefined", [0.5; 3], f32::NAN, 1.0)
+                .validate()
+                .is_err()
         );
         for ior in [0.99, 0.0, -1.5, f32::NAN, f32::INFINITY] {
             let error = Material::dielectric("glass", ior).validate().unwrap_err();

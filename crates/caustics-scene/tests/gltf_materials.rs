@@ -4,7 +4,7 @@
 
 mod writer;
 
-use caustics_scene::gltf::{GltfError, WarningKind, load_slice};
+use caustics_scene::gltf::{GltfError, LoadOptions, WarningKind, load_slice, load_slice_with};
 use caustics_scene::{Material, Surface};
 use glam::Vec3;
 use serde_json::{Value, json};
@@ -110,21 +110,11 @@ fn a_mirror() {
 fn everything_else_is_lambertian_and_says_so_unless_it_is() {
     for (metallic, roughness, factor, message) in [
         (0.0, 1.0, 0.0, ""),
-        (0.0, 0.5, 0.0, "roughness 0.5 is not modelled"),
-        (0.0, 0.0, 0.0, "roughness 0 is not modelled"),
-        (
-            1.0,
-            0.25,
-            0.0,
-            "metallic 1 with roughness 0.25 is not modelled",
-        ),
-        (1.0, 1.0, 0.0, "metallic 1 with roughness 1 is not modelled"),
-        (
-            0.5,
-            0.0,
-            0.0,
-            "metallic 0.5 with roughness 0 is not modelled",
-        ),
+        (0.0, 0.5, 0.0, "metallic 0 and roughness 0.5 are left out"),
+        (0.0, 0.0, 0.0, "metallic 0 and roughness 0 are left out"),
+        (1.0, 0.25, 0.0, "metallic 1 and roughness 0.25 are left out"),
+        (1.0, 1.0, 0.0, "metallic 1 and roughness 1 are left out"),
+        (0.5, 0.0, 0.0, "metallic 0.5 and roughness 0 are left out"),
         (0.0, 0.25, 1.0, "roughness 0.25 is not modelled"),
         (0.0, 0.0, 0.5, "transmission 0.5 is not modelled"),
     ] {
@@ -142,6 +132,45 @@ fn everything_else_is_lambertian_and_says_so_unless_it_is() {
             assert_eq!(warnings, [expected]);
         }
     }
+}
+
+#[test]
+fn receivers_are_as_glossy_as_the_file_says_when_asked_for() {
+    let options = LoadOptions {
+        glossy_receivers: true,
+    };
+    let convert = |metallic, roughness, factor| {
+        let material = json!({
+            "name": "m",
+            "pbrMetallicRoughness": pbr(metallic, roughness),
+            "extensions": transmission(factor)
+        });
+        let loaded = load_slice_with(&file_of(material).glb(), None, &options).unwrap();
+        (loaded.scene.materials()[0].surface, loaded.warnings.len())
+    };
+    for (metallic, roughness) in [
+        (0.0, 1.0),
+        (0.0, 0.5),
+        (0.0, 0.0),
+        (1.0, 0.25),
+        (1.0, 1.0),
+        (0.5, 0.0),
+    ] {
+        let glossy = Surface::Glossy {
+            base_color: Vec3::new(0.2, 0.4, 0.6),
+            metallic: metallic as f32,
+            roughness: roughness as f32,
+        };
+        assert_eq!(convert(metallic, roughness, 0.0), (glossy, 0));
+    }
+    // What is specular stays so, and what transmits is not modelled either way.
+    assert!(matches!(convert(1.0, 0.0, 0.0), (Surface::Metal { .. }, 0)));
+    assert!(matches!(
+        convert(0.0, 0.0, 1.0),
+        (Surface::Dielectric { .. }, _)
+    ));
+    assert_eq!(convert(0.0, 0.25, 1.0), (DIFFUSE, 1));
+    assert_eq!(convert(0.0, 0.0, 0.5), (DIFFUSE, 1));
 }
 
 #[test]

@@ -60,6 +60,9 @@ pub struct TraceOptions {
     /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
     /// those are nearer, and drawn in at the edges of sheets of light.
     pub check_footprints: bool,
+    /// Whether photons carry differentials. Without, their footprints have no axes: enough for
+    /// estimates from the nearest photons, at less time.
+    pub differentials: bool,
 }
 
 /// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
@@ -101,6 +104,7 @@ impl Default for TraceOptions {
             sequence: Sequence::Grid,
             refinement: Refinement::default(),
             check_footprints: true,
+            differentials: true,
         }
     }
 }

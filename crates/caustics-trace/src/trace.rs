@@ -65,6 +65,8 @@ pub fn trace_plan<I: Intersect + ?Sized>(
                 let mut refined = trace_refined(&batch, levels, detail, progress);
                 map.photons.append(&mut refined.photons);
                 map.ledger.merge(&refined.ledger);
+            } else if !options.differentials {
+                batch.trace::<0>(&mut map, progress);
             } else if planned.emitter().dimensions() == 2 {
                 batch.trace::<2>(&mut map, progress);
             } else {
@@ -99,6 +101,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     /// Whether its lattice is made finer where it must.
     fn is_refined(&self) -> bool {
         self.options.refinement.levels > 0
+            && self.options.differentials
             && self.options.sequence == Sequence::Grid
             && self.planned.emitter().dimensions() == 2
             && self.planned.count() > 0

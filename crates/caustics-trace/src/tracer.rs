@@ -309,9 +309,12 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             kept *= survival;
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
-        let differential = self
-            .scattered(branch, point, outgoing)
-            .scaled(kept.powf(-1.0 / N as f32));
+        let apart = if N > 0 {
+            kept.powf(-1.0 / N as f32)
+        } else {
+            1.0
+        };
+        let differential = self.scattered(branch, point, outgoing).scaled(apart);
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {
@@ -345,6 +348,9 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         outgoing: &Outgoing,
     ) -> RayDifferential<N> {
         let before = &branch.differential;
+        if N == 0 {
+            return *before;
+        }
         let direction = branch.ray.direction;
         let side = if point.from_outside { 1.0 } else { -1.0 };
         let gradient = self.world.normal_gradient(point);

@@ -121,6 +121,7 @@ proptest! {
                     let options = TraceOptions {
                         photons: 500, seed, max_depth, branching, min_weight, aim, sequence,
                         refinement: Refinement { levels: (seed % 3) as u32, ..Refinement::default() },
+                        differentials: seed % 4 != 0,
                         ..TraceOptions::default()
                     };
                     let map = trace_photons(&world, &intersector, &options, &|_| {});
@@ -177,4 +178,32 @@ fn a_missing_entry_shows() {
     let mut ledger = map.ledger.clone();
     ledger.emit(map.photons[0].flux);
     assert!(ledger.imbalance() > 1e-6);
+}
+
+#[test]
+fn photons_without_differentials_land_where_those_with_do() {
+    for lamp in [Lamp::Point, Lamp::Sun, Lamp::Panel] {
+        let mut scene = Scene::new();
+        add_floor(&mut scene, -2.0, 4.0);
+        let glass = Material::dielectric("glass", 1.5);
+        add_sphere(&mut scene, Vec3::ZERO, 0.5, glass);
+        add_lamp(&mut scene, &lamp, [1.0; 3]);
+        let (world, intersector) = flattened(&scene);
+        let trace = |differentials| {
+            let options = TraceOptions {
+                photons: 1000,
+                differentials,
+                ..TraceOptions::default()
+            };
+            trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options")
+        };
+        let (with, without) = (trace(true), trace(false));
+        assert_eq!(with.photons.len(), without.photons.len());
+        for (with, without) in with.photons.iter().zip(&without.photons) {
+            assert_eq!(with.position, without.position);
+            assert_eq!((with.incoming, with.flux), (without.incoming, without.flux));
+            assert_eq!(without.axes, [Vec3::ZERO; 2]);
+            assert!(with.axes != [Vec3::ZERO; 2]);
+        }
+    }
 }

@@ -25,6 +25,9 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --images FOLDER      keeps the pictures as EXR
   --peers FILE         other renderers' rows (default: benches/data/peers.csv)
   --measure no         measures nothing, rewrites tables and charts from the CSV
+  --full yes           measures caustics seen through glass and in mirrors, too, on the scenes that
+                       have a reference of them (p01, p08, p10), at the counts of --photons
+  --full-csv FILE      its rows (default: benches/data/full.csv)
 ";
 
 /// What the user asked for.
@@ -42,6 +45,8 @@ pub(crate) struct Arguments {
     pub(crate) images: Option<PathBuf>,
     pub(crate) peers: PathBuf,
     pub(crate) measures: bool,
+    pub(crate) measures_full: bool,
+    pub(crate) full_csv: PathBuf,
 }
 
 impl Arguments {
@@ -64,6 +69,8 @@ impl Arguments {
             images: None,
             peers: root.join("benches/data/peers.csv"),
             measures: true,
+            measures_full: false,
+            full_csv: root.join("benches/data/full.csv"),
         }
     }
 
@@ -110,6 +117,8 @@ impl Arguments {
             "--svg" => self.svg = value.into(),
             "--images" => self.images = Some(value.into()),
             "--peers" => self.peers = value.into(),
+            "--full" => self.measures_full = value != "no",
+            "--full-csv" => self.full_csv = value.into(),
             "--measure" => self.measures = value != "no",
             _ => return Err(format!("no option {option} (try --help)").into()),
         }

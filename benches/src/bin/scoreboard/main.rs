@@ -5,6 +5,7 @@
 mod arguments;
 mod chart;
 mod flip;
+mod full;
 mod measure;
 mod metric;
 mod nearest_search;
@@ -53,8 +54,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Vec::new()
     };
+    let conditions = conditions(&arguments.machine);
+    let full = full::rows(arguments, &conditions)?;
     if arguments.measures {
-        let conditions = conditions(&arguments.machine);
         for name in &arguments.scenes {
             let stage = Stage::load(name)?;
             let measured = measure::measure(&stage, arguments, &conditions)?;
@@ -72,7 +74,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let document = fs::read_to_string(&arguments.document)
         .map_err(|error| format!("{}: {error}", arguments.document.display()))?;
-    let written = with_tables(&document, &tables::all(&rows, &peers))?;
+    let mut all = tables::all(&rows, &peers);
+    all.push(("full", full::table(&full)));
+    let written = with_tables(&document, &all)?;
     fs::write(&arguments.document, written)?;
     Ok(())
 }

@@ -7,6 +7,7 @@ use super::element::{Element, ElementKind};
 use super::error::GltfError;
 use super::hierarchy::{PlacedNode, placed_nodes};
 use super::material;
+use super::options::LoadOptions;
 use super::primitive::PrimitiveReader;
 use super::warning::{WarningKind, Warnings};
 use crate::camera::{Camera, CameraError, Projection};
@@ -21,6 +22,7 @@ use std::collections::{HashMap, HashSet};
 /// Builds a scene node by node, making meshes and materials when they are first used.
 pub(crate) struct Loader<'a> {
     document: &'a Document,
+    options: &'a LoadOptions,
     primitives: PrimitiveReader<'a>,
     scene: Scene,
     warnings: Warnings,
@@ -31,9 +33,14 @@ pub(crate) struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
-    pub(crate) fn new(document: &'a Document, buffers: &'a Buffers<'a>) -> Self {
+    pub(crate) fn new(
+        document: &'a Document,
+        buffers: &'a Buffers<'a>,
+        options: &'a LoadOptions,
+    ) -> Self {
         Self {
             document,
+            options,
             primitives: PrimitiveReader::new(AccessorReader::new(document, buffers)),
             scene: Scene::new(),
             warnings: Warnings::default(),
@@ -171,7 +178,7 @@ impl<'a> Loader<'a> {
             Some(index) => {
                 let materials = &self.document.materials;
                 follow(materials, index, ElementKind::Material, || user.clone())?;
-                material::convert(self.document, index, &mut self.warnings)?
+                material::convert(self.document, index, self.options, &mut self.warnings)?
             }
             None => material::default_material(),
         };

@@ -3,6 +3,7 @@
 use super::document::{Document, is_supported};
 use super::element::Element;
 use super::error::GltfError;
+use super::options::LoadOptions;
 use super::warning::{WarningKind, Warnings};
 use crate::material::{MAX_ATTENUATION, Material, Surface};
 use ::gltf::json;
@@ -23,12 +24,13 @@ pub(crate) fn default_material() -> Material {
 pub(crate) fn convert(
     document: &Document,
     index: usize,
+    options: &LoadOptions,
     warnings: &mut Warnings,
 ) -> Result<Material, GltfError> {
     let source = &document.materials[index];
     let element = document.material_element(index);
     report(source, &element, warnings);
-    let surface = surface(source, &element, warnings)?;
+    let surface = surface(source, &element, options, warnings)?;
     let extensions = source.extensions.as_ref();
     let strength = extensions
         .and_then(|extensions| extensions.emissive_strength.as_ref())
@@ -48,6 +50,7 @@ pub(crate) fn convert(
 fn surface(
     source: &json::Material,
     element: &Element,
+    options: &LoadOptions,
     warnings: &mut Warnings,
 ) -> Result<Surface, GltfError> {
     let in_unit = |quantity, value: f32| match value {
@@ -91,16 +94,20 @@ fn surface(
         warnings.push(element, WarningKind::Roughness { roughness });
     } else if transmission > 0.0 {
         warnings.push(element, WarningKind::PartialTransmission { transmission });
-    } else if metallic > 0.0 {
+    } else if options.glossy_receivers {
+        return Ok(Surface::Glossy {
+            base_color,
+            metallic,
+            roughness,
+        });
+    } else if metallic > 0.0 || roughness < 1.0 {
         warnings.push(
             element,
-            WarningKind::Metallic {
+            WarningKind::Gloss {
                 metallic,
                 roughness,
             },
         );
-    } else if roughness < 1.0 {
-        warnings.push(element, WarningKind::Roughness { roughness });
     }
     // A rough metal reflects about its base colour in all, as the base of a dielectric does.
     Ok(Surface::Diffuse { albedo: base_color })

@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | `transmissionFactor` 1, `roughnessFactor` 0 | [`Dielectric`](crate::Surface::Dielectric): index of refraction from `KHR_materials_ior` (1.5 without), absorption `-ln(attenuationColor) / attenuationDistance` from `KHR_materials_volume`, dispersion from `KHR_materials_dispersion`, priority from an integer `priority` in the material's extras (0 without) |
 //! | otherwise, `metallicFactor` 1, `roughnessFactor` 0 | [`Metal`](crate::Surface::Metal) with `f0` the base colour |
+//! | otherwise, with [`LoadOptions::glossy_receivers`], anything that transmits nothing | [`Glossy`](crate::Surface::Glossy) with base colour, metallicity and roughness |
 //! | anything else | [`Diffuse`](crate::Surface::Diffuse) with the base colour as albedo, however metallic or transmissive, since that is about the light that it sends back in all |
 //! | no material | the same, white |
 //! | `emissiveFactor` times `emissiveStrength` | radiance, from the front, and from the back where `doubleSided` |
@@ -16,7 +17,7 @@
 //! emission in W/(sr m^2).
 //!
 //! # What is not modelled
-//! comes back as a list of [`Warning`]s: textures, rough specular surfaces, partial transmission,
+//! comes back as a list of [`Warning`]s: textures, rough glass, partial transmission, gloss where it is not asked for,
 //! alpha, vertex colours, skins, animations, morph targets, points and lines, ranges of lights,
 //! extensions that are optional and unknown. What a file *requires* and is not known is an error.
 //!
@@ -45,6 +46,7 @@ mod error;
 mod hierarchy;
 mod loader;
 mod material;
+mod options;
 mod primitive;
 mod uri;
 mod warning;
@@ -54,6 +56,7 @@ use std::path::Path;
 
 pub use element::{Element, ElementKind};
 pub use error::{AccessorProblem, GltfError};
+pub use options::LoadOptions;
 pub use warning::{Warning, WarningKind};
 
 /// A scene from a file, and what of the file it leaves out.
@@ -70,10 +73,25 @@ pub struct LoadedScene {
 /// # Errors
 /// See [`GltfError`]; messages do not name the file, but the parts in it and other files.
 pub fn load_path(path: impl AsRef<Path>) -> Result<LoadedScene, GltfError> {
+    load_path_with(path, &LoadOptions::default())
+}
+
+/// Like [`load_path`], with options.
+///
+/// # Errors
+/// As [`load_path`].
+pub fn load_path_with(
+    path: impl AsRef<Path>,
+    options: &LoadOptions,
+) -> Result<LoadedScene, GltfError> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| GltfError::Read { source })?;
     // The folder of a bare name is the current one, an empty path.
-    load_slice(&bytes, Some(path.parent().unwrap_or(Path::new(""))))
+    load_slice_with(
+        &bytes,
+        Some(path.parent().unwrap_or(Path::new(""))),
+        options,
+    )
 }
 
 /// Loads the bytes of a file. `base` is the folder in which other files that it refers to are looked
@@ -101,10 +119,22 @@ pub fn load_path(path: impl AsRef<Path>) -> Result<LoadedScene, GltfError> {
 /// # Errors
 /// See [`GltfError`].
 pub fn load_slice(bytes: &[u8], base: Option<&Path>) -> Result<LoadedScene, GltfError> {
+    load_slice_with(bytes, base, &LoadOptions::default())
+}
+
+/// Like [`load_slice`], with options.
+///
+/// # Errors
+/// See [`GltfError`].
+pub fn load_slice_with(
+    bytes: &[u8],
+    base: Option<&Path>,
+    options: &LoadOptions,
+) -> Result<LoadedScene, GltfError> {
     let container = container::split(bytes)?;
     let document = document::Document::parse(container.json)?;
     let buffers = buffers::Buffers::load(&document, container.bin, base)?;
-    let (scene, warnings) = loader::Loader::new(&document, &buffers).load()?;
+    let (scene, warnings) = loader::Loader::new(&document, &buffers, options).load()?;
     Ok(LoadedScene {
         scene,
         warnings: warnings.into_vec(),

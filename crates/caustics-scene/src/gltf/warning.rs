@@ -32,14 +32,14 @@ pub enum WarningKind {
         /// Which of the material's textures.
         slot: &'static str,
     },
-    /// A roughness with which the surface would reflect or refract into a lobe; it is Lambertian
-    /// instead.
+    /// A transmissive surface that is rough, and would refract into a lobe; it is Lambertian instead.
     Roughness {
         /// The roughness.
         roughness: f32,
     },
-    /// A metal that is not a smooth one; it is Lambertian instead.
-    Metallic {
+    /// A receiver with gloss; it is Lambertian, since
+    /// [`LoadOptions::glossy_receivers`](super::LoadOptions::glossy_receivers) is off.
+    Gloss {
         /// How metallic.
         metallic: f32,
         /// How rough.
@@ -123,12 +123,12 @@ impl fmt::Display for WarningKind {
                     "roughness {roughness} is not modelled, taken as Lambertian"
                 )
             }
-            Self::Metallic {
+            Self::Gloss {
                 metallic,
                 roughness,
             } => write!(
                 f,
-                "metallic {metallic} with roughness {roughness} is not modelled, taken as Lambertian"
+                "metallic {metallic} and roughness {roughness} are left out, taken as Lambertian"
             ),
             Self::PartialTransmission { transmission } => {
                 write!(

@@ -1,0 +1,392 @@
+//! Pictures of the oracles' receivers: exact ones, and what the default estimate makes of photons.
+
+use caustics_accel::BvhOptions;
+use caustics_render::{FootprintOptions, GBuffer, splat};
+use caustics_sampling::Sequence;
+use caustics_scene::{Camera, Projection, Scene, World};
+use caustics_trace::{Photon, trace_photons};
+use glam::{Affine3A, DVec2, Mat3, Vec3};
+use std::f64::consts::{PI, TAU};
+
+use crate::TestError;
+use crate::measure::{Region, without_chance};
+use crate::oracles::{
+    MirrorCylinder, ParabolicMirror, PlanoConvexLens, RadialLens, SphereLens, WavyWater,
+};
+
+/// Pixels along each side.
+pub const SIZE: usize = 128;
+
+/// Pixels darker than this part of the mean are not lit.
+const LIT: f64 = 0.05;
+
+/// Half of the width of the water's receiver that is shown, in metres.
+const WATER_HALF: f64 = 0.5;
+
+/// A square part of a receiver that light falls on from above, or from below, and the irradiance of
+/// its pixels.
+pub struct ExactPicture {
+    /// What it shows.
+    pub name: &'static str,
+    scene: Scene,
+    /// Specular events of the light that the oracle describes.
+    events: u32,
+    center: DVec2,
+    half: f64,
+    height: f64,
+    is_lit_from_below: bool,
+    /// How far off the receiver the camera is, in metres.
+    distance: f64,
+    /// Mean irradiance of each pixel, row by row along z, in W/m².
+    pub irradiance: Vec<f64>,
+}
+
+/// How far a picture is from the exact one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureError {
+    /// Mean of (t - r)² / (r² + (0.1 mean r)²).
+    pub relative_mse: f64,
+    /// Median of |t - r| over lit pixels, relative to their mean.
+    pub median: f64,
+    /// 99.99th percentile of the same.
+    pub outliers: f64,
+    /// Where the largest error is: column and row.
+    pub worst: [usize; 2],
+}
+
+impl ExactPicture {
+    /// A glass ball nearer to the receiver than its focus: a bright edge with a fold.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn sphere_lens() -> Result<Self, TestError> {
+        let lens = SphereLens {
+            radius: 1.0,
+            ior: 1.5,
+            floor_distance: 1.2,
+            irradiance: 2.0,
+        };
+        let half = 0.5;
+        Ok(Self {
+            name: "sphere lens",
+            scene: lens.scene()?,
+            events: 2,
+            center: DVec2::ZERO,
+            half,
+            height: -lens.floor_distance,
+            is_lit_from_below: false,
+            distance: 0.1,
+            irradiance: radial(&lens, half),
+        })
+    }
+
+    /// A plano-convex lens half way to its focus.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn plano_convex_lens() -> Result<Self, TestError> {
+        let lens = PlanoConvexLens {
+            curvature_radius: 1.0,
+            aperture: 0.5,
+            ior: 1.5,
+            floor_distance: 0.9,
+            irradiance: 2.0,
+        };
+        let half = 0.35;
+        Ok(Self {
+            name: "plano-convex lens",
+            scene: lens.scene(128, 512)?,
+            events: 2,
+            center: DVec2::ZERO,
+            half,
+            height: -lens.floor_distance,
+            is_lit_from_below: false,
+            distance: 0.1,
+            irradiance: radial(&lens, half),
+        })
+    }
+
+    /// The nephroid inside a mirror ring.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn mirror_cylinder() -> Result<Self, TestError> {
+        let ring = MirrorCylinder {
+            radius: 1.0,
+            height: 0.9,
+            f0: 0.8,
+            angle: 0.8,
+            sun: 3.0,
+        };
+        let (center, half) = (DVec2::new(0.45, 0.0), 0.4);
+        let exact = |min, max| ring.flux(&Region::Rectangle { min, max });
+        Ok(Self {
+            name: "mirror cylinder",
+            scene: ring.scene(1024)?,
+            events: 1,
+            center,
+            half,
+            height: 0.0,
+            is_lit_from_below: false,
+            distance: 0.1,
+            irradiance: pixels(center, half, exact),
+        })
+    }
+
+    /// The smooth image that a piece of a parabolic mirror makes, and its ends.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn parabolic_mirror() -> Result<Self, TestError> {
+        let mirror = ParabolicMirror {
+            focal_length: 1.0,
+            near: 0.4,
+            width: 1.0,
+            screen_height: 1.6,
+            f0: 0.8,
+            sun: 3.0,
+        };
+        let (center, half) = (DVec2::new(-0.7, 0.0), 0.24);
+        Ok(Self {
+            name: "parabolic mirror",
+            scene: mirror.scene(256)?,
+            events: 1,
+            center,
+            half,
+            height: mirror.screen_height,
+            is_lit_from_below: true,
+            distance: 0.1,
+            irradiance: pixels(center, half, |min, max| mirror.flux(min, max)),
+        })
+    }
+
+    /// Waves too low for folds.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn wavy_water() -> Result<Self, TestError> {
+        let water = WavyWater::with_strength(1.0);
+        let half = WATER_HALF;
+        let exact = pixels(DVec2::ZERO, half, |min, max| water.flux(min, max));
+        Self::water("wavy water", &water, exact)
+    }
+
+    /// Waves with folds.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn folded_water() -> Result<Self, TestError> {
+        let water = WavyWater::with_strength(3.0);
+        let area = (2.0 * WATER_HALF / SIZE as f64).powi(2);
+        let flux = water.binned_flux(WATER_HALF, SIZE, 8192);
+        let exact = flux.into_iter().map(|flux| flux / area).collect();
+        Self::water("folded water", &water, exact)
+    }
+
+    fn water(
+        name: &'static str,
+        water: &WavyWater,
+        irradiance: Vec<f64>,
+    ) -> Result<Self, TestError> {
+        Ok(Self {
+            name,
+            scene: water.scene(512)?,
+            events: 1,
+            center: DVec2::ZERO,
+            half: WATER_HALF,
+            height: 0.0,
+            is_lit_from_below: false,
+            distance: 0.2,
+            irradiance,
+        })
+    }
+
+    /// All of them.
+    ///
+    /// # Errors
+    /// If a scene cannot be made.
+    pub fn all() -> Result<Vec<Self>, TestError> {
+        Ok(vec![
+            Self::sphere_lens()?,
+            Self::plano_convex_lens()?,
+            Self::mirror_cylinder()?,
+            Self::parabolic_mirror()?,
+            Self::wavy_water()?,
+            Self::folded_water()?,
+        ])
+    }
+
+    /// The irradiance that the default estimate gives from so many photons.
+    ///
+    /// # Errors
+    /// If the scene cannot be traced or splatted.
+    pub fn estimated(&self, photons: u32, seed: u64) -> Result<Vec<f64>, TestError> {
+        let world = World::new(&self.scene)?;
+        let intersector = world.intersector(&BvhOptions::default())?;
+        let mut options = without_chance(Sequence::Grid, self.events + 1);
+        (options.photons, options.seed) = (photons, seed);
+        let map = trace_photons(&world, &intersector, &options, &|_| {})?;
+        let counted: Vec<Photon> = map
+            .photons
+            .into_iter()
+            .filter(|photon| photon.events == self.events)
+            .collect();
+        let size = SIZE as u32;
+        let buffer = GBuffer::new(&world, &intersector, &self.camera()?, size, size)?;
+        let (image, _) = splat(&buffer, &counted, &FootprintOptions::default())?;
+        // The receiver's albedo is a half.
+        let irradiance = |pixel: &[f32; 3]| 2.0 * PI * f64::from(pixel[0]);
+        let rows: Vec<&[[f32; 3]]> = image.pixels().chunks(SIZE).collect();
+        let in_order: Vec<&&[[f32; 3]]> = if self.is_lit_from_below {
+            rows.iter().rev().collect()
+        } else {
+            rows.iter().collect()
+        };
+        Ok(in_order
+            .into_iter()
+            .flat_map(|row| row.iter().map(irradiance))
+            .collect())
+    }
+
+    /// Close before the receiver, on its lit side, with rows along z, upwards from below.
+    fn camera(&self) -> Result<Camera, TestError> {
+        let up = if self.is_lit_from_below { -1.0 } else { 1.0 };
+        let axes = Mat3::from_cols(Vec3::X, -up * Vec3::Z, up * Vec3::Y);
+        let eye = Vec3::new(
+            self.center.x as f32,
+            self.height as f32 + up * self.distance as f32,
+            self.center.y as f32,
+        );
+        let extent = self.half as f32;
+        let projection = Projection::Orthographic {
+            xmag: extent,
+            ymag: extent,
+        };
+        let pose = Affine3A::from_mat3_translation(axes, eye);
+        Ok(Camera::new("receiver", pose, projection)?)
+    }
+
+    /// The error of a picture of the same pixels.
+    #[must_use]
+    pub fn error(&self, picture: &[f64]) -> PictureError {
+        let mean = self.irradiance.iter().sum::<f64>() / self.irradiance.len() as f64;
+        let pairs = || picture.iter().zip(&self.irradiance);
+        let relative = |(test, exact): (&f64, &f64)| {
+            (test - exact).powi(2) / (exact * exact + 0.01 * mean * mean)
+        };
+        let mut lit: Vec<(f64, usize)> = pairs()
+            .zip(0..)
+            .filter(|((_, exact), _)| **exact > LIT * mean)
+            .map(|((test, exact), pixel)| ((test - exact).abs() / mean, pixel))
+            .collect();
+        lit.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let at = |part: f64| lit[((part * lit.len() as f64) as usize).min(lit.len() - 1)];
+        let worst = lit[lit.len() - 1].1;
+        PictureError {
+            relative_mse: pairs().map(relative).sum::<f64>() / picture.len() as f64,
+            median: at(0.5).0,
+            outliers: at(0.9999).0,
+            worst: [worst % SIZE, worst / SIZE],
+        }
+    }
+}
+
+/// The mean irradiance of pixels from the flux that they get.
+fn pixels(center: DVec2, half: f64, flux: impl Fn(DVec2, DVec2) -> f64) -> Vec<f64> {
+    let width = 2.0 * half / SIZE as f64;
+    (0..SIZE * SIZE)
+        .map(|pixel| {
+            let corner = DVec2::new((pixel % SIZE) as f64, (pixel / SIZE) as f64);
+            let min = center - half + width * corner;
+            flux(min, min + width) / (width * width)
+        })
+        .collect()
+}
+
+/// The mean irradiance of pixels around a lens: rings of the beam, spread around the axis.
+fn radial(lens: &impl RadialLens, half: f64) -> Vec<f64> {
+    const RINGS: u32 = 40_000;
+    let width = 2.0 * half / SIZE as f64;
+    let mut irradiance = vec![0.0; SIZE * SIZE];
+    let step = lens.max_angle() / f64::from(RINGS);
+    for ring in 0..RINGS {
+        let angle = (f64::from(ring) + 0.5) * step;
+        let Some(landing) = lens.land(angle) else {
+            continue;
+        };
+        let radius = landing.position.abs();
+        if radius > half * 2.0f64.sqrt() {
+            continue;
+        }
+        let area = PI * lens.curvature_radius().powi(2) * (2.0 * angle).sin() * step;
+        let flux = lens.irradiance() * area * landing.transmittance;
+        // Eight points for each pixel on the way around.
+        let places = ((TAU * radius / width) * 8.0).ceil().max(8.0) as u32;
+        let share = flux / f64::from(places) / (width * width);
+        for place in 0..places {
+            let turn = TAU * (f64::from(place) + 0.37 * f64::from(ring % 97)) / f64::from(places);
+            let at = (radius * DVec2::from_angle(turn) + half) / width;
+            if at.min_element() >= 0.0 && at.max_element() < SIZE as f64 {
+                irradiance[at.y as usize * SIZE + at.x as usize] += share;
+            }
+        }
+    }
+    irradiance
+}
+
+/// The order of convergence: minus the slope of the error's logarithm over the count's, fitted.
+#[must_use]
+pub fn fitted_order(points: &[(u32, f64)]) -> f64 {
+    let logs: Vec<DVec2> = points
+        .iter()
+        .map(|&(count, error)| DVec2::new(f64::from(count).ln(), error.ln()))
+        .collect();
+    let mean = logs.iter().copied().sum::<DVec2>() / logs.len() as f64;
+    let (mut covariance, mut variance) = (0.0, 0.0);
+    for point in &logs {
+        let off = *point - mean;
+        covariance += off.x * off.y;
+        variance += off.x * off.x;
+    }
+    -covariance / variance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_a_power_is_its_exponent() {
+        let points = [1u32 << 10, 1 << 14, 1 << 20].map(|n| (n, 3.0 * f64::from(n).powf(-0.7)));
+        assert!((fitted_order(&points) - 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rings_add_up_to_the_flux_of_the_lens() -> Result<(), TestError> {
+        let picture = ExactPicture::sphere_lens()?;
+        let area = (2.0 * picture.half / SIZE as f64).powi(2);
+        let lens = SphereLens {
+            radius: 1.0,
+            ior: 1.5,
+            floor_distance: 1.2,
+            irradiance: 2.0,
+        };
+        // The whole pixels in a disc, against the closed form of two discs around them.
+        let inside = |radius: f64| {
+            let pixels = picture.irradiance.iter().zip(0usize..);
+            pixels
+                .filter(|(_, pixel)| {
+                    let at = DVec2::new((pixel % SIZE) as f64, (pixel / SIZE) as f64) + 0.5;
+                    (at / SIZE as f64 - 0.5).length() < radius
+                })
+                .map(|(value, _)| value * area)
+                .sum::<f64>()
+        };
+        let found = inside(0.4);
+        assert!(
+            found > lens.flux_within(0.39) && found < lens.flux_within(0.41),
+            "{found}"
+        );
+        Ok(())
+    }
+}
