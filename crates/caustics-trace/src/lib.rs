@@ -57,7 +57,7 @@
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
 //! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
-//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`] | |
+//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`], [`trace_part`] | |
 //! | keep photons from frame to frame, and trace anew what a change demands | [`LivePhotons`], [`Change`] | |
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
@@ -155,4 +155,4 @@ pub use photon::{Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::{trace_photons, trace_plan};
+pub use trace::{trace_part, trace_photons, trace_plan};

@@ -9,7 +9,7 @@ use caustics_scene::{Instance, Light, Material, Scene, Shape};
 use caustics_trace::glam::Vec3;
 use caustics_trace::{
     Aim, Casters, EmissionBatch, EmissionPlan, Fate, LightSource, Photon, PhotonMap, TraceOptions,
-    trace_photons, trace_plan,
+    trace_part, trace_photons, trace_plan,
 };
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
@@ -132,6 +132,37 @@ fn what_two_pairs_cover_is_booked_and_counted_once() {
         // Without the rule, the overlap would be a good part of the caustic.
         assert!(overlap.flux.x > 0.05 * ledger.entry(Fate::Stored).flux.x);
     }
+}
+
+#[test]
+fn parts_join_to_the_whole() {
+    let scene = apart(0.0);
+    let (world, intersector) = flattened(&scene);
+    let options = TraceOptions {
+        photons: 9_000,
+        ..TraceOptions::default()
+    };
+    let plan = EmissionPlan::new(&world, &intersector, &options).expect("valid options");
+    let whole = trace_plan(&world, &intersector, &plan, &options, &|_| {}).expect("valid options");
+    let mut photons = Vec::new();
+    let mut rays = 0;
+    for start in (0..plan.count()).step_by(777) {
+        let part = trace_part(&world, &intersector, &plan, &options, start..start + 777);
+        let part = part.expect("valid options");
+        assert!(part.ledger.imbalance() < 1e-6);
+        photons.extend(part.photons);
+        rays += part.ledger.rays;
+    }
+    assert!(photons == whole.photons);
+    assert_eq!(rays, whole.ledger.rays);
+    let beyond = trace_part(
+        &world,
+        &intersector,
+        &plan,
+        &options,
+        plan.count()..u32::MAX,
+    );
+    assert!(beyond.expect("valid options").photons.is_empty());
 }
 
 #[test]
