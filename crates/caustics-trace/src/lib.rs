@@ -63,6 +63,7 @@
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
+//! | leave out what a host can do without | [`Culling`], [`ViewVolume`] | |
 //! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
 //! | carry derivatives along any path, from a light or the eye | [`RayDifferential`] | Igehy 1999 |
@@ -115,6 +116,7 @@
 mod area_emission;
 mod casters;
 mod compact;
+mod culling;
 mod differential;
 mod domain;
 mod emission;
@@ -138,6 +140,7 @@ mod trail;
 pub use area_emission::AreaSurface;
 pub use casters::{Casters, MAX_CASTERS};
 pub use compact::{CompactFootprint, CompactPhoton};
+pub use culling::{Culling, ViewVolume};
 pub use differential::RayDifferential;
 pub use domain::EmissionDomain;
 pub use emission::{Emission, EmissionSample};

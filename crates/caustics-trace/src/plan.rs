@@ -4,6 +4,7 @@ use caustics_sampling::{CounterRng, PointSet, Sequence, apportion_with_floor};
 use caustics_scene::World;
 
 use crate::casters::Casters;
+use crate::culling::Culling;
 use crate::emission::EmissionSample;
 use crate::emitter::Emitter;
 use crate::lattice::Lattice;
@@ -316,6 +317,11 @@ impl EmissionBatch {
         options: &TraceOptions,
         pilots: u32,
     ) {
+        // A camera that turns moves no photons.
+        let options = &TraceOptions {
+            culling: Culling::default(),
+            ..*options
+        };
         let ledger = if self.emitter.dimensions() == 2 {
             self.pilots::<I, 2>(world, intersect, casters, options, pilots)
         } else {
