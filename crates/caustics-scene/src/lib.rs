@@ -40,6 +40,7 @@
 //! | --- | --- |
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
 //! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, discs and balls that shine |
+//! | [`Environment`] | light from all around |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
 //! | [`World`], [`Object`] | the scene flattened |
@@ -71,6 +72,7 @@
 mod area_light;
 pub mod builtin;
 mod camera;
+mod environment;
 #[cfg(feature = "gltf")]
 pub mod gltf;
 mod intersector;
@@ -85,6 +87,7 @@ mod world;
 pub use area_light::AreaLight;
 pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
+pub use environment::{Environment, EnvironmentError, EnvironmentSample};
 pub use intersector::SceneIntersector;
 pub use light::{Light, LightError};
 pub use light_point::LightPoint;

@@ -71,7 +71,9 @@ impl ProjectionMap {
             EmissionDomain::Sphere { origin, .. } => {
                 map.draw_directions(world, objects, *origin, &Cells::of_sphere());
             }
-            EmissionDomain::Area { .. } | EmissionDomain::Nothing => return None,
+            EmissionDomain::Area { .. } | EmissionDomain::Sky { .. } | EmissionDomain::Nothing => {
+                return None;
+            }
         }
         map.marked = map.words.iter().map(|word| word.count_ones()).sum();
         Some(map)
