@@ -38,7 +38,8 @@ pub enum Aim {
 /// How photons are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceOptions {
-    /// Photons emitted, by all lights together.
+    /// Photons emitted, by all lights together. With [`Aim::Casters`] a few less, where no lattice
+    /// has exactly as many points on a caster's outline.
     pub photons: u32,
     /// Chooses the random numbers; the same seed gives the same bits.
     pub seed: u64,
