@@ -107,8 +107,8 @@
 //!
 //! - Arvo, Kirk, *Particle Transport and Image Synthesis*, SIGGRAPH 1990 (Russian roulette).
 //! - Born, Wolf, *Principles of Optics*, section 1.5 (Snell's law, Fresnel's formulae).
-//! - Cigolle, Donow, Evangelakos, Mara, McGuire, Meyer, *A Survey of Efficient Representations for
-//!   Independent Unit Vectors*, Journal of Computer Graphics Techniques 2014.
+//! - Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, Journal of
+//!   Computer Graphics Techniques 2014.
 //! - Igehy, *Tracing Ray Differentials*, SIGGRAPH 1999 (transfer, reflection, refraction).
 //! - Jensen, *Global Illumination using Photon Maps*, Rendering Techniques 1996.
 //! - Schlick, *An Inexpensive BRDF Model for Physically-based Rendering*, Eurographics 1994.
