@@ -2,7 +2,7 @@ use caustics_accel::Intersect;
 use caustics_geometry::{Frame, Ray};
 use caustics_sampling::CounterRng;
 use caustics_sampling::warp::Cone;
-use caustics_scene::{AreaLight, Light, World};
+use caustics_scene::{AreaLight, Environment, Light, World};
 use glam::{Vec2, Vec3};
 
 use crate::eye::Receiver;
@@ -45,6 +45,9 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
         }
         for light in self.world.emitters() {
             reflected += self.reflected_from_area(receiver, light, rng);
+        }
+        if let Some(sky) = self.world.environment() {
+            reflected += self.reflected_from_sky(receiver, sky, rng);
         }
         reflected
     }
@@ -138,6 +141,24 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
             return Vec3::ZERO;
         }
         receiver.reflectance(direction) * radiance * (cone.solid_angle() * cosine)
+    }
+
+    /// From one random direction, by importance.
+    fn reflected_from_sky(
+        &self,
+        receiver: &Receiver,
+        sky: &Environment,
+        rng: &mut CounterRng,
+    ) -> Vec3 {
+        let from = sky.sample(rng.next_vec2());
+        let cosine = self.cosine(receiver, from.towards);
+        if cosine <= 0.0
+            || from.pdf <= 0.0
+            || self.is_blocked(receiver, from.towards, f32::INFINITY)
+        {
+            return Vec3::ZERO;
+        }
+        receiver.reflectance(from.towards) * from.radiance * (cosine / from.pdf)
     }
 
     fn reflected_from_area(

@@ -95,7 +95,7 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
     }
 
     /// Calls `visit` for each receiver that the path along `ray` reaches, and returns the radiance
-    /// that emissive surfaces on its way send to the eye.
+    /// that emissive surfaces on its way, and the environment beyond, send to the eye.
     ///
     /// `media` are those around the ray's origin; the ray's direction must be a unit vector.
     pub fn trace(
@@ -128,6 +128,11 @@ impl<'a, I: Intersect + ?Sized> EyeTracer<'a, I> {
     ) -> Vec3 {
         self.rays += 1;
         let hit = self.intersect.closest_hit(&branch.ray);
+        if hit.is_none()
+            && let Some(sky) = self.world.environment()
+        {
+            return branch.weight * sky.radiance(branch.ray.direction);
+        }
         let Some((hit, point)) =
             hit.and_then(|hit| Some((hit, self.world.surface(&branch.ray, &hit)?)))
         else {

@@ -41,6 +41,7 @@
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
 //! | [`Brdf`] | how receivers reflect: Lambertian, or glTF's metallic-roughness model |
 //! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, discs and balls that shine |
+//! | [`Environment`] | light from all around |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
 //! | [`World`], [`Object`] | the scene flattened |
@@ -76,6 +77,7 @@ mod area_light;
 mod brdf;
 pub mod builtin;
 mod camera;
+mod environment;
 #[cfg(feature = "gltf")]
 pub mod gltf;
 mod instanced;
@@ -92,6 +94,7 @@ pub use area_light::AreaLight;
 pub use brdf::Brdf;
 pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
+pub use environment::{Environment, EnvironmentError, EnvironmentSample};
 pub use instanced::InstancedIntersector;
 pub use intersector::SceneIntersector;
 pub use light::{Light, LightError};

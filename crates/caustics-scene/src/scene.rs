@@ -1,6 +1,7 @@
 //! What there is: meshes, materials, objects that combine them, lights and cameras.
 
 use crate::camera::{Camera, CameraError};
+use crate::environment::Environment;
 use crate::light::{Light, LightError};
 use crate::material::{Material, MaterialError};
 use caustics_geometry::{MeshError, Sphere, SphereError, TriangleMesh};
@@ -94,6 +95,7 @@ pub struct Scene {
     instances: Vec<Instance>,
     lights: Vec<Light>,
     cameras: Vec<Camera>,
+    environment: Option<Environment>,
 }
 
 impl Scene {
@@ -205,6 +207,17 @@ impl Scene {
         }
         self.cameras.push(camera);
         Ok(())
+    }
+
+    /// Surrounds the scene with light, or with none.
+    pub fn set_environment(&mut self, environment: Option<Environment>) {
+        self.environment = environment;
+    }
+
+    /// The light from all around, if there is any.
+    #[must_use]
+    pub fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref()
     }
 
     /// The meshes, in the order in which they were added.

@@ -2,6 +2,7 @@
 
 use crate::area_light::AreaLight;
 use crate::camera::Camera;
+use crate::environment::Environment;
 use crate::light::Light;
 use crate::material::Material;
 use crate::scene::{Instance, Scene, SceneError, Shape, place_sphere};
@@ -54,6 +55,7 @@ pub struct World {
     materials: Vec<Material>,
     lights: Vec<Light>,
     cameras: Vec<Camera>,
+    environment: Option<Environment>,
     emitters: Vec<AreaLight>,
     bounds: Aabb,
     specular_bounds: Aabb,
@@ -70,6 +72,7 @@ impl World {
             materials: scene.materials().to_vec(),
             lights: scene.lights().to_vec(),
             cameras: scene.cameras().to_vec(),
+            environment: scene.environment().cloned(),
             ..Self::default()
         };
         world.reserve(scene)?;
@@ -265,10 +268,16 @@ impl World {
         &self.emitters
     }
 
-    /// Whether there is any light at all, of either kind.
+    /// Whether there is any light at all, of any kind.
     #[must_use]
     pub fn is_lit(&self) -> bool {
-        !self.lights.is_empty() || !self.emitters.is_empty()
+        !self.lights.is_empty() || !self.emitters.is_empty() || self.environment.is_some()
+    }
+
+    /// The light from all around, if there is any.
+    #[must_use]
+    pub fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref()
     }
 
     /// The cameras, in the scene's order.

@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 
 use crate::area_emission::{self, AreaSurface};
 use crate::emission::{Emission, EmissionSample, differential};
+use crate::sky_emission;
 
 /// The rays that an emitter sends out, as an image of the unit square or, for lights with an area,
 /// of the unit cube of four dimensions.
@@ -54,6 +55,16 @@ pub enum EmissionDomain {
         /// or from inside it, they fill the hemisphere in proportion to the cosine.
         target: Option<Sphere>,
     },
+    /// Rays from the world's environment: directions by
+    /// [`Environment::sample`](caustics_scene::Environment::sample), places on the disc across them
+    /// by [`square_to_disc_concentric`](caustics_sampling::warp::square_to_disc_concentric) in a
+    /// [`Frame::from_normal`] of the direction towards the light.
+    Sky {
+        /// The ball that the discs just cover.
+        target: Sphere,
+        /// How far before the ball's centre rays start, in metres.
+        distance: f32,
+    },
     /// No rays: the light cannot reach what it is aimed at.
     Nothing,
 }
@@ -63,7 +74,7 @@ impl EmissionDomain {
     #[must_use]
     pub fn dimensions(&self) -> usize {
         match self {
-            Self::Area { .. } => 4,
+            Self::Area { .. } | Self::Sky { .. } => 4,
             _ => 2,
         }
     }
@@ -87,7 +98,7 @@ impl EmissionDomain {
         match self {
             Self::Sphere { origin, .. } | Self::Cone { origin, .. } => Some(*origin),
             Self::Area { surface, .. } => surface.start(world),
-            Self::Rectangle { .. } | Self::Nothing => None,
+            Self::Rectangle { .. } | Self::Sky { .. } | Self::Nothing => None,
         }
     }
 
@@ -135,6 +146,9 @@ impl EmissionDomain {
             Self::Area { surface, target } => {
                 area_emission::emit(world, surface, target.as_ref(), sample)
             }
+            Self::Sky { target, distance } => {
+                sky_emission::emit(world.environment()?, target, *distance, sample)
+            }
             Self::Nothing => None,
         }
     }
@@ -159,6 +173,10 @@ impl EmissionDomain {
                         None => true,
                     }
             }
+            Self::Sky { target, .. } => {
+                let across = (target.center - ray.origin).cross(ray.direction);
+                across.length() <= target.radius
+            }
             Self::Nothing => false,
         }
     }
@@ -176,7 +194,7 @@ impl EmissionDomain {
                 let along = |edge: Vec3| from_corner.dot(edge) / edge.length_squared();
                 Some(Vec2::new(along(edges[0]), along(edges[1])))
             }
-            Self::Area { .. } | Self::Nothing => None,
+            Self::Area { .. } | Self::Sky { .. } | Self::Nothing => None,
         }
     }
 }

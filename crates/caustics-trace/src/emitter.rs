@@ -1,7 +1,7 @@
-use caustics_geometry::Frame;
+use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::warp::Cone;
 use caustics_sampling::{PointSet, Sequence};
-use caustics_scene::{Light, World};
+use caustics_scene::{Environment, Light, World};
 use glam::{DVec3, Vec3};
 
 use crate::area_emission::AreaSurface;
@@ -27,6 +27,8 @@ pub enum LightSource {
         /// Whether it is the side that the geometric normals point to.
         front: bool,
     },
+    /// The world's [`Environment`](caustics_scene::Environment).
+    Environment,
 }
 
 /// The rays that one light sends towards one caster, or everywhere.
@@ -70,6 +72,9 @@ impl Emitter {
                 sources.push(LightSource::Object { emitter, front });
             }
         }
+        if world.environment().is_some() {
+            sources.push(LightSource::Environment);
+        }
         let mut emitters = Vec::new();
         for source in sources {
             match aim {
@@ -110,7 +115,7 @@ impl Emitter {
     }
 
     /// Everything that the light emits, towards all casters and elsewhere, in watts; for a
-    /// directional light, onto a square around the scene.
+    /// directional light, onto a square around the scene, for an environment onto a ball around it.
     #[must_use]
     pub fn power(&self) -> DVec3 {
         self.power
@@ -156,6 +161,7 @@ impl Emitter {
         let light = match self.source {
             LightSource::Light { index } => index << 2,
             LightSource::Object { emitter, front } => (emitter << 2) | 2 | u32::from(front),
+            LightSource::Environment => 1,
         };
         let object = self
             .caster
@@ -179,6 +185,7 @@ impl Emitter {
                 surface: AreaSurface::Object { emitter, front },
                 target: outline.map(|it| *it.bounding()),
             },
+            LightSource::Environment => sky_domain(world, outline),
         };
         Self::with_domain(world, source, caster, domain, power(world, source))
     }
@@ -286,6 +293,17 @@ fn is_kept(old: &EmissionDomain, tight: &EmissionDomain, outline: &Outline) -> b
                 && target.center.distance(least.center) + least.radius <= target.radius
                 && target.radius * target.radius <= LARGEST * least.radius * least.radius
         }
+        (
+            EmissionDomain::Sky { target, distance },
+            EmissionDomain::Sky {
+                target: least,
+                distance: same_distance,
+            },
+        ) => {
+            distance == same_distance
+                && target.center.distance(least.center) + least.radius <= target.radius
+                && target.radius * target.radius <= LARGEST * least.radius * least.radius
+        }
         _ => false,
     }
 }
@@ -312,6 +330,7 @@ fn widened(domain: &EmissionDomain) -> EmissionDomain {
                 AreaSurface::Rectangle { .. } | AreaSurface::Disc { .. } | AreaSurface::Object { .. },
             target: Some(target),
         } => target.radius *= SLACK,
+        EmissionDomain::Sky { target, .. } => target.radius *= SLACK,
         _ => {}
     }
     wider
@@ -337,6 +356,16 @@ fn power(world: &World, source: LightSource) -> DVec3 {
             let light = &world.emitters()[emitter as usize];
             let sides = if light.double_sided() { 0.5 } else { 1.0 };
             sides * light.power().as_dvec3()
+        }
+        LightSource::Environment => {
+            let total = world.environment().map_or(Vec3::ZERO, Environment::total);
+            let (_, radius) = world.bounds().bounding_sphere();
+            let area = if world.bounds().is_empty() {
+                0.0
+            } else {
+                std::f64::consts::PI * f64::from(radius).powi(2)
+            };
+            area * total.as_dvec3()
         }
     }
 }
@@ -389,6 +418,20 @@ fn sun_domain(
         edges,
         direction,
         irradiance,
+    }
+}
+
+fn sky_domain(world: &World, target: Option<&Outline>) -> EmissionDomain {
+    if world.bounds().is_empty() {
+        return EmissionDomain::Nothing;
+    }
+    let (center, radius) = world.bounds().bounding_sphere();
+    let target = target.map_or(Sphere { center, radius }, |it| *it.bounding());
+    // Outside the scene, in coarse steps as for a sun.
+    let reach = target.center.distance(center) + 1.001 * radius;
+    EmissionDomain::Sky {
+        target,
+        distance: reach.log2().ceil().exp2(),
     }
 }
 

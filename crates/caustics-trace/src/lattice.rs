@@ -6,6 +6,9 @@ use crate::projection_map::ProjectionMap;
 /// How often the number of points is corrected to that of the marked ones.
 const CORRECTIONS: u32 = 12;
 
+/// A set with this part less points than it may have is large enough.
+const LEAST_MISSING: f64 = 5e-4;
+
 /// The points that an emitter's photons are made from: a whole set or, with a projection map, those
 /// of its points that lie in marked cells.
 ///
@@ -53,7 +56,7 @@ impl Lattice {
                 if best.as_ref().is_none_or(|it| lattice.count > it.count) {
                     best = Some(lattice);
                 }
-                if found >= f64::from(budget) {
+                if f64::from(budget) - found <= LEAST_MISSING * f64::from(budget) {
                     break;
                 }
             }

@@ -23,6 +23,10 @@ pub enum Fate {
     Direct,
     /// Cut off at the maximum depth.
     TooDeep,
+    /// Landed with a footprint larger than [`Culling::max_area`](crate::Culling::max_area).
+    Wide,
+    /// Landed outside [`Culling::view`](crate::Culling::view).
+    Unseen,
     /// Ended by Russian roulette.
     Roulette,
     /// Lost to a direction or a position that was not a finite number.
@@ -31,7 +35,7 @@ pub enum Fate {
 
 impl Fate {
     /// All fates, in the order of the ledger's lines.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Stored,
         Self::Absorbed,
         Self::Escaped,
@@ -40,6 +44,8 @@ impl Fate {
         Self::Overlap,
         Self::Direct,
         Self::TooDeep,
+        Self::Wide,
+        Self::Unseen,
         Self::Roulette,
         Self::Invalid,
     ];
@@ -56,6 +62,8 @@ impl Fate {
             Self::Overlap => "overlap",
             Self::Direct => "direct",
             Self::TooDeep => "too deep",
+            Self::Wide => "wide",
+            Self::Unseen => "unseen",
             Self::Roulette => "roulette",
             Self::Invalid => "invalid",
         }

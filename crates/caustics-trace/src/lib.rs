@@ -57,12 +57,13 @@
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
 //! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
-//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`] | |
+//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`], [`trace_part`] | |
 //! | keep photons from frame to frame, and trace anew what a change demands | [`LivePhotons`], [`Change`] | |
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
+//! | leave out what a host can do without | [`Culling`], [`ViewVolume`] | |
 //! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
 //! | carry derivatives along any path, from a light or the eye | [`RayDifferential`] | Igehy 1999 |
@@ -106,6 +107,8 @@
 //!
 //! - Arvo, Kirk, *Particle Transport and Image Synthesis*, SIGGRAPH 1990 (Russian roulette).
 //! - Born, Wolf, *Principles of Optics*, section 1.5 (Snell's law, Fresnel's formulae).
+//! - Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, Journal of
+//!   Computer Graphics Techniques 2014.
 //! - Igehy, *Tracing Ray Differentials*, SIGGRAPH 1999 (transfer, reflection, refraction).
 //! - Jensen, *Global Illumination using Photon Maps*, Rendering Techniques 1996.
 //! - Schlick, *An Inexpensive BRDF Model for Physically-based Rendering*, Eurographics 1994.
@@ -115,6 +118,7 @@
 mod area_emission;
 mod casters;
 mod compact;
+mod culling;
 mod differential;
 mod domain;
 mod emission;
@@ -132,6 +136,7 @@ mod plan;
 mod projection_map;
 mod refine;
 mod scatter;
+mod sky_emission;
 mod trace;
 mod traced;
 mod tracer;
@@ -140,6 +145,7 @@ mod trail;
 pub use area_emission::AreaSurface;
 pub use casters::{Casters, MAX_CASTERS};
 pub use compact::{CompactFootprint, CompactPhoton};
+pub use culling::{Culling, ViewVolume};
 pub use differential::RayDifferential;
 pub use domain::EmissionDomain;
 pub use emission::{Emission, EmissionSample};
@@ -157,4 +163,4 @@ pub use photon::{FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::{trace_photons, trace_plan};
+pub use trace::{trace_part, trace_photons, trace_plan};

@@ -9,6 +9,7 @@ use crate::options::{TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
 use crate::plan::EmissionPlan;
 use crate::trace::Batch;
+use crate::traced::Traced;
 use crate::trail::{Space, Trail};
 
 /// Points of an emitter's set whose photons are kept together.
@@ -71,6 +72,8 @@ pub struct LivePhotons {
 struct Chunk {
     records: Vec<Record>,
     photons: Vec<Photon>,
+    /// For each photon, what its path met.
+    paths: Vec<u32>,
     bookings: Vec<Booking>,
 }
 
@@ -236,11 +239,11 @@ impl LivePhotons {
         let mut batches = self.batches.iter();
         for of_light in lights {
             let before = map.ledger.emitted().flux - map.ledger.entry(Fate::Overlap).flux;
-            for chunks in batches.by_ref().take(of_light.len()) {
-                for chunk in chunks {
-                    map.photons.extend_from_slice(&chunk.photons);
-                    chunk.book(&mut map.ledger);
-                }
+            for (planned, chunks) in of_light.iter().zip(batches.by_ref()) {
+                let mut traced = Chunk::joined(chunks);
+                traced.check_footprints(&self.options, planned);
+                map.photons.append(&mut traced.photons);
+                map.ledger.merge(&traced.ledger);
             }
             let after = map.ledger.emitted().flux - map.ledger.entry(Fate::Overlap).flux;
             if let Some(first) = of_light.first() {
@@ -412,7 +415,7 @@ fn renewed<I: Intersect + ?Sized, const N: usize>(
             tracer.trace(&emission, batch.planned.media(), &mut rng);
         }
         next.photons.append(&mut tracer.photons);
-        tracer.paths.clear();
+        next.paths.append(&mut tracer.paths);
         let ledger = std::mem::take(&mut tracer.ledger);
         let (touched, passed) = tracer
             .trail
@@ -423,6 +426,28 @@ fn renewed<I: Intersect + ?Sized, const N: usize>(
 }
 
 impl Chunk {
+    /// Chunks in their order as one.
+    fn joined(chunks: &[Self]) -> Traced {
+        let mut all = Traced {
+            photons: Vec::new(),
+            paths: Vec::new(),
+            starts: Vec::new(),
+            ledger: EnergyLedger::default(),
+        };
+        for chunk in chunks {
+            let mut start = all.photons.len();
+            let base = start;
+            for record in &chunk.records {
+                all.starts.push(start);
+                start = base + record.photons_end as usize;
+            }
+            all.photons.extend_from_slice(&chunk.photons);
+            all.paths.extend_from_slice(&chunk.paths);
+            chunk.book(&mut all.ledger);
+        }
+        all
+    }
+
     /// Takes over a photon of another chunk.
     fn keep(&mut self, old: &Self, index: usize) {
         let starts = index.checked_sub(1).map_or((0, 0), |it| {
@@ -430,8 +455,10 @@ impl Chunk {
             (before.photons_end, before.bookings_end)
         });
         let record = &old.records[index];
+        let photons = starts.0 as usize..record.photons_end as usize;
         self.photons
-            .extend_from_slice(&old.photons[starts.0 as usize..record.photons_end as usize]);
+            .extend_from_slice(&old.photons[photons.clone()]);
+        self.paths.extend_from_slice(&old.paths[photons]);
         self.bookings
             .extend_from_slice(&old.bookings[starts.1 as usize..record.bookings_end as usize]);
         self.records.push(Record {

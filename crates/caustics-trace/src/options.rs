@@ -1,6 +1,8 @@
 use caustics_sampling::Sequence;
 use thiserror::Error;
 
+use crate::culling::Culling;
+
 /// What happens to a photon where a surface both reflects and refracts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -36,7 +38,8 @@ pub enum Aim {
 /// How photons are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceOptions {
-    /// Photons emitted, by all lights together.
+    /// Photons emitted, by all lights together. With [`Aim::Casters`] a few less, where no lattice
+    /// has exactly as many points on a caster's outline.
     pub photons: u32,
     /// Chooses the random numbers; the same seed gives the same bits.
     pub seed: u64,
@@ -63,6 +66,8 @@ pub struct TraceOptions {
     /// Whether photons carry differentials. Without, their footprints have no axes: enough for
     /// estimates from the nearest photons, at less time.
     pub differentials: bool,
+    /// Which photons are not stored though they land.
+    pub culling: Culling,
 }
 
 /// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
@@ -105,6 +110,7 @@ impl Default for TraceOptions {
             refinement: Refinement::default(),
             check_footprints: true,
             differentials: true,
+            culling: Culling::default(),
         }
     }
 }
@@ -123,6 +129,16 @@ impl TraceOptions {
         if !(self.refinement.detail >= 0.0 && self.refinement.detail.is_finite()) {
             return Err(TraceError::Detail {
                 detail: self.refinement.detail,
+            });
+        }
+        if !(self.culling.min_flux >= 0.0 && self.culling.min_flux.is_finite()) {
+            return Err(TraceError::MinFlux {
+                min_flux: self.culling.min_flux,
+            });
+        }
+        if self.culling.max_area.is_nan() || self.culling.max_area < 0.0 {
+            return Err(TraceError::MaxArea {
+                max_area: self.culling.max_area,
             });
         }
         if !(0.0..=1.0).contains(&self.share_floor) {
@@ -154,6 +170,18 @@ pub enum TraceError {
     ShareFloor {
         /// The floor, in parts of an equal share.
         share_floor: f32,
+    },
+    /// A flux below which photons are thinned that is none.
+    #[error("the least flux {min_flux} is not a finite number of at least 0")]
+    MinFlux {
+        /// The flux, in watts.
+        min_flux: f32,
+    },
+    /// An area of footprints that is none.
+    #[error("the largest area of footprints {max_area} is not a number of at least 0")]
+    MaxArea {
+        /// The area, in square metres.
+        max_area: f32,
     },
     /// A detail that is no length.
     #[error("the detail of refinement {detail} is not a finite number of at least 0")]

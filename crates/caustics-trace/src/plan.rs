@@ -4,6 +4,7 @@ use caustics_sampling::{CounterRng, PointSet, Sequence, apportion_with_floor};
 use caustics_scene::World;
 
 use crate::casters::Casters;
+use crate::culling::Culling;
 use crate::emission::EmissionSample;
 use crate::emitter::Emitter;
 use crate::lattice::Lattice;
@@ -23,9 +24,12 @@ const PILOT_PART: u32 = 8;
 /// be given its floor.
 const LEAST_WEIGHT: f64 = 1e-6;
 
-/// What it costs to draw a triangle into a projection map, in rays that miss: measured at 110 to
-/// 160 ns a triangle of 32,000 to 200,000, against 250 to 450 ns a ray.
-const TRIANGLE_COST: f64 = 0.4;
+/// What a projection map costs, in rays that miss: measured in processor time at 5 ms for a sun and
+/// 20 ms for a lamp, against 0.2 µs a ray.
+const MAP_COST: f64 = 50_000.0;
+
+/// What each triangle that is drawn into it costs, likewise: 0.08 to 0.16 µs.
+const TRIANGLE_COST: f64 = 0.5;
 
 /// Where more of an emitter's square than this is marked, its projection map is not used.
 const FULL_COVERAGE: f32 = 0.9;
@@ -284,6 +288,13 @@ impl EmissionBatch {
         self.lattice.sample(index)
     }
 
+    /// The upper half of the stream that [`random`](Self::random) draws from: the same for this pair
+    /// in every frame.
+    #[must_use]
+    pub fn stream(&self) -> u32 {
+        self.stream
+    }
+
     /// Where the photon of point `number` draws its random decisions from.
     #[must_use]
     pub fn random(&self, seed: u64, number: u64) -> CounterRng {
@@ -321,6 +332,11 @@ impl EmissionBatch {
         options: &TraceOptions,
         pilots: u32,
     ) {
+        // A camera that turns moves no photons.
+        let options = &TraceOptions {
+            culling: Culling::default(),
+            ..*options
+        };
         let ledger = if self.emitter.dimensions() == 2 {
             self.pilots::<I, 2>(world, intersect, casters, options, pilots)
         } else {
@@ -371,8 +387,9 @@ impl EmissionBatch {
             .map(|&object| world.objects()[object as usize].triangles.len() as u64)
             .sum();
         let saved = (1.0 - self.accuracy) / self.accuracy.max(1e-3) * f64::from(self.share);
+        let cost = MAP_COST + TRIANGLE_COST * triangles as f64;
         let is_refined = options.refinement.levels > 0 && options.sequence == Sequence::Grid;
-        if options.aim != Aim::Casters || is_refined || saved < TRIANGLE_COST * triangles as f64 {
+        if options.aim != Aim::Casters || is_refined || saved < cost {
             return None;
         }
         let map = ProjectionMap::of(world, objects, self.emitter.domain())?;

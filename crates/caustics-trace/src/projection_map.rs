@@ -1,5 +1,7 @@
+use std::cell::OnceCell;
+
 use caustics_geometry::{Frame, Sphere};
-use caustics_sampling::warp::{Cone, square_to_sphere_octahedral};
+use caustics_sampling::warp::{Cone, sphere_octahedral_to_square, square_to_sphere_octahedral};
 use caustics_scene::World;
 use glam::{Vec2, Vec3};
 
@@ -15,9 +17,6 @@ const LEVELS: u32 = RESOLUTION.ilog2();
 /// By how much the circle around a cell of directions is wider than the one through its corners:
 /// its sides are curved.
 const CELL_MARGIN: f32 = 1.15;
-
-/// Levels at the top of the tree whose cells are too large for that, and are always entered.
-const COARSE_LEVELS: u32 = 3;
 
 /// The largest radius of a piece of a surface, as the light sees it, that is looked at as a whole, in
 /// radii of a cell: wider ones are halved until they fit.
@@ -71,7 +70,9 @@ impl ProjectionMap {
             EmissionDomain::Sphere { origin, .. } => {
                 map.draw_directions(world, objects, *origin, &Cells::of_sphere());
             }
-            EmissionDomain::Area { .. } | EmissionDomain::Nothing => return None,
+            EmissionDomain::Area { .. } | EmissionDomain::Sky { .. } | EmissionDomain::Nothing => {
+                return None;
+            }
         }
         map.marked = map.words.iter().map(|word| word.count_ones()).sum();
         Some(map)
@@ -193,9 +194,8 @@ impl ProjectionMap {
             pieces.push((corners.map(|it| it - origin), HALVINGS));
             while let Some((corners, halvings)) = pieces.pop() {
                 match Cap::around(corners) {
-                    Some(cap) if cap.radius <= widest || halvings == 0 => {
-                        self.draw_cap(&cap, cells);
-                    }
+                    Some(cap) if cap.radius <= widest => self.draw_small_cap(&cap, cells),
+                    Some(cap) if halvings == 0 => self.draw_cap(&cap, cells),
                     None if halvings == 0 => return self.words.fill(u32::MAX),
                     _ => {
                         let halves = halved(corners);
@@ -215,12 +215,35 @@ impl ProjectionMap {
         }
     }
 
+    /// As [`draw_cap`](Self::draw_cap), for one that is not much larger than a cell: only the cells
+    /// around its middle are looked at.
+    fn draw_small_cap(&mut self, cap: &Cap, cells: &Cells) {
+        let middle = (cells.inverse)(cap.axis) * RESOLUTION as f32;
+        let reach = Vec2::splat(1.02 * cap.radius / cells.least_stretch * RESOLUTION as f32 + 0.01);
+        let (low, high) = ((middle - reach).floor(), (middle + reach).floor());
+        let last = Vec2::splat(RESOLUTION as f32 - 1.0);
+        let is_inside = low.cmpge(Vec2::ZERO).all() && high.cmple(last).all();
+        if !middle.is_finite() || (cells.wraps && !is_inside) {
+            return self.draw_cap(cap, cells);
+        }
+        let (low, high) = (low.clamp(Vec2::ZERO, last), high.clamp(Vec2::ZERO, last));
+        for row in low.y as u32..=high.y as u32 {
+            for column in low.x as u32..=high.x as u32 {
+                if !self.is_marked(row * RESOLUTION + column)
+                    && cap.meets(cells.cap(LEVELS, column, row))
+                {
+                    self.mark(column, row);
+                }
+            }
+        }
+    }
+
     /// Marks every cell that a cap on the sphere of directions may touch.
     fn draw_cap(&mut self, cap: &Cap, cells: &Cells) {
         // Level, column and row.
         let mut pending = vec![(0u32, 0u32, 0u32)];
         while let Some((level, column, row)) = pending.pop() {
-            if level >= COARSE_LEVELS && !cap.meets(cells.cap(level, column, row)) {
+            if !cap.meets(cells.cap(level, column, row)) {
                 continue;
             }
             if level == LEVELS {
@@ -315,44 +338,42 @@ impl Cap {
 
 /// The caps around the cells of a square of directions, for each level of their tree.
 struct Cells {
-    levels: Vec<Vec<Cap>>,
+    finest: Vec<Cap>,
+    /// The levels above, from the coarsest; made when first asked for, by a wide cap.
+    coarser: OnceCell<Vec<Vec<Cap>>>,
+    /// The point of the square for a direction.
+    inverse: Box<dyn Fn(Vec3) -> Vec2>,
+    /// The least angle, in radians, between the directions of two points of the square, relative to
+    /// the points' distance.
+    least_stretch: f32,
+    /// Whether the map goes on from one side of the square to another.
+    wraps: bool,
 }
 
 impl Cells {
     fn of_cone(frame: &Frame, cone: Cone) -> Self {
-        Self::new(&|at| frame.to_world(cone.sample_concentric(at).value))
+        let frame = *frame;
+        // Where the square becomes a disc, 2 by 0.568 (the smaller singular value of the concentric
+        // map, at its diagonals); from there to the cap, across the radius at its edge.
+        let chord = (cone.solid_angle() / std::f32::consts::PI).sqrt();
+        let across = (0.5 + 0.5 * cone.cosine()).max(0.0).sqrt();
+        Self {
+            finest: finest(&|at| frame.to_world(cone.sample_concentric(at).value)),
+            coarser: OnceCell::new(),
+            inverse: Box::new(move |direction| cone.invert_concentric(frame.to_local(direction))),
+            least_stretch: 2.0 * 0.568 * chord * across,
+            wraps: false,
+        }
     }
 
     fn of_sphere() -> Self {
-        Self::new(&|at| square_to_sphere_octahedral(at).value)
-    }
-
-    fn new(direction: &dyn Fn(Vec2) -> Vec3) -> Self {
-        let level = |level: u32| {
-            let side = 1u32 << level;
-            let size = 1.0 / side as f32;
-            let cap = |cell: u32| {
-                let corner = Vec2::new((cell % side) as f32, (cell / side) as f32) * size;
-                let at = |x: f32, y: f32| {
-                    let inside =
-                        (corner + size * Vec2::new(x, y)).min(Vec2::splat(1.0f32.next_down()));
-                    direction(inside).normalize()
-                };
-                let axis = at(0.5, 0.5);
-                let chord = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-                    .map(|(x, y)| (at(x, y) - axis).length())
-                    .into_iter()
-                    .fold(0.0, f32::max);
-                Cap::new(axis, CELL_MARGIN * 2.0 * (0.5 * chord).min(1.0).asin())
-            };
-            if level < COARSE_LEVELS {
-                Vec::new()
-            } else {
-                (0..side * side).map(cap).collect()
-            }
-        };
         Self {
-            levels: (0..=LEVELS).map(level).collect(),
+            finest: finest(&|at| square_to_sphere_octahedral(at).value),
+            coarser: OnceCell::new(),
+            inverse: Box::new(sphere_octahedral_to_square),
+            // The whole sphere over the largest singular value, 2 sqrt(3.82) by 2 at the equator.
+            least_stretch: 1.6,
+            wraps: true,
         }
     }
 
@@ -363,6 +384,76 @@ impl Cells {
     }
 
     fn cap(&self, level: u32, column: u32, row: u32) -> &Cap {
-        &self.levels[level as usize][((row << level) + column) as usize]
+        let cell = ((row << level) + column) as usize;
+        if level == LEVELS {
+            return &self.finest[cell];
+        }
+        let levels = self.coarser.get_or_init(|| {
+            let mut levels = vec![coarser(&self.finest, RESOLUTION as usize)];
+            while let Some(last) = levels.last().filter(|it| it.len() > 1) {
+                levels.push(coarser(last, last.len().isqrt()));
+            }
+            levels.reverse();
+            levels
+        });
+        &levels[level as usize][cell]
     }
+}
+
+/// The caps around the finest cells, row by row.
+fn finest(direction: &dyn Fn(Vec2) -> Vec3) -> Vec<Cap> {
+    let at = |x: f32, y: f32| {
+        let point = Vec2::new(x, y) / RESOLUTION as f32;
+        direction(point.min(Vec2::splat(1.0f32.next_down()))).normalize()
+    };
+    let side = RESOLUTION as usize;
+    let row_of_corners = |row: usize| -> Vec<Vec3> {
+        (0..=side)
+            .map(|column| at(column as f32, row as f32))
+            .collect()
+    };
+    let mut caps = Vec::with_capacity(side * side);
+    let mut above = row_of_corners(0);
+    for row in 0..side {
+        let below = row_of_corners(row + 1);
+        for column in 0..side {
+            let axis = at(column as f32 + 0.5, row as f32 + 0.5);
+            let corners = [
+                above[column],
+                above[column + 1],
+                below[column],
+                below[column + 1],
+            ];
+            let chord = corners
+                .map(|it| (it - axis).length())
+                .into_iter()
+                .fold(0.0, f32::max);
+            caps.push(Cap::new(
+                axis,
+                CELL_MARGIN * 2.0 * (0.5 * chord).min(1.0).asin(),
+            ));
+        }
+        above = below;
+    }
+    caps
+}
+
+/// The caps of the next coarser level, each around those of the four cells in it.
+fn coarser(caps: &[Cap], side: usize) -> Vec<Cap> {
+    let half = side / 2;
+    let mut merged = Vec::with_capacity(half * half);
+    for row in 0..half {
+        for column in 0..half {
+            let first = 2 * row * side + 2 * column;
+            let four = [first, first + 1, first + side, first + side + 1].map(|it| caps[it]);
+            let sum: Vec3 = four.iter().map(|it| it.axis).sum();
+            let axis = sum.normalize_or(four[0].axis);
+            let radius = four
+                .map(|it| 2.0 * (0.5 * it.axis.distance(axis)).min(1.0).asin() + it.radius)
+                .into_iter()
+                .fold(0.0, f32::max);
+            merged.push(Cap::new(axis, radius));
+        }
+    }
+    merged
 }

@@ -66,16 +66,63 @@ pub fn trace_plan<I: Intersect + ?Sized>(
                 map.photons.append(&mut refined.photons);
                 map.ledger.merge(&refined.ledger);
             } else if !options.differentials {
-                batch.trace::<0>(&mut map, progress);
+                batch.trace::<0>(&mut map, 0..planned.count(), progress);
             } else if planned.emitter().dimensions() == 2 {
-                batch.trace::<2>(&mut map, progress);
+                batch.trace::<2>(&mut map, 0..planned.count(), progress);
             } else {
-                batch.trace::<4>(&mut map, progress);
+                batch.trace::<4>(&mut map, 0..planned.count(), progress);
             }
         }
         if let Some(first) = of_light.first() {
             let aimed = counted(&map) - before;
             map.ledger.emit_unaimed(first.emitter().power() - aimed);
+        }
+    }
+    Ok(map)
+}
+
+/// Traces some of the photons of a plan, counted over all its batches in their order; numbers from
+/// [`EmissionPlan::count`] on are no photons.
+///
+/// Over ranges that join to all of them, photons and ledgers are those of [`trace_plan`], but for
+/// what is not aimed at, which no ledger of a part has, and but for footprints, which are checked
+/// against their neighbours only in a part that has all photons of a pair: for a host that has a few milliseconds in
+/// each frame, or that hands photons on as they come.
+///
+/// # Errors
+/// If the options are out of range. Those that ask for a [`Refinement`](crate::Refinement) are taken
+/// as if they did not: its photons depend on each other.
+pub fn trace_part<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    plan: &EmissionPlan,
+    options: &TraceOptions,
+    photons: std::ops::Range<u32>,
+) -> Result<PhotonMap, TraceError> {
+    options.validate()?;
+    let mut map = PhotonMap::default();
+    let mut first = 0u32;
+    for of_light in plan.lights() {
+        for (number, planned) in of_light.iter().enumerate() {
+            let batch = Batch {
+                world,
+                intersect,
+                options,
+                plan,
+                planned,
+                earlier: &of_light[..number],
+            };
+            let count = planned.count();
+            let within = photons.start.saturating_sub(first).min(count)
+                ..photons.end.saturating_sub(first).min(count);
+            if !options.differentials {
+                batch.trace::<0>(&mut map, within, &|_| {});
+            } else if planned.emitter().dimensions() == 2 {
+                batch.trace::<2>(&mut map, within, &|_| {});
+            } else {
+                batch.trace::<4>(&mut map, within, &|_| {});
+            }
+            first = first.saturating_add(count);
         }
     }
     Ok(map)
@@ -114,11 +161,17 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
             .aimed_at(caster.map(|it| (self.plan.casters(), it)), self.earlier)
     }
 
-    fn trace<const N: usize>(&self, map: &mut PhotonMap, progress: &(dyn Fn(u32) + Sync)) {
-        let count = self.planned.count();
-        let chunks = count.div_ceil(CHUNK);
+    /// Traces the photons with these numbers.
+    fn trace<const N: usize>(
+        &self,
+        map: &mut PhotonMap,
+        photons: std::ops::Range<u32>,
+        progress: &(dyn Fn(u32) + Sync),
+    ) {
+        let chunks = (photons.len() as u32).div_ceil(CHUNK);
         let run = |chunk: u32| {
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+            let start = photons.start + chunk * CHUNK;
+            let range = start..photons.end.min(start.saturating_add(CHUNK));
             let finished = range.len() as u32;
             let traced = self.trace_range::<N>(range);
             progress(finished);
@@ -133,10 +186,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         let parts: Vec<Traced> = (0..chunks).map(run).collect();
 
         let mut all = Traced::joined(parts);
-        let checks = self.options.check_footprints && N == 2;
-        if checks && self.planned.points().sequence() == Sequence::Grid {
-            all.check_footprints(self.planned.lattice());
-        }
+        all.check_footprints(self.options, self.planned);
         map.photons.append(&mut all.photons);
         map.ledger.merge(&all.ledger);
     }

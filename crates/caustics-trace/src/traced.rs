@@ -1,7 +1,10 @@
-use crate::lattice::Lattice;
+use caustics_sampling::Sequence;
+
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{CheckedFootprint, LatticePhotons};
+use crate::options::TraceOptions;
 use crate::photon::{FootprintSource, Photon};
+use crate::plan::EmissionBatch;
 
 /// What some points of a light's lattice became.
 pub(crate) struct Traced {
@@ -36,8 +39,16 @@ impl Traced {
         all
     }
 
-    /// Checks every footprint against where the photon's neighbours on a lattice landed.
-    pub(crate) fn check_footprints(&mut self, lattice: &Lattice) {
+    /// Checks every footprint against where the photon's neighbours landed, if that is asked for and
+    /// they are all the photons of a lattice of two parameters.
+    pub(crate) fn check_footprints(&mut self, options: &TraceOptions, planned: &EmissionBatch) {
+        let is_lattice = planned.points().sequence() == Sequence::Grid
+            && planned.emitter().dimensions() == 2
+            && self.starts.len() == planned.count() as usize;
+        if !(options.check_footprints && options.differentials && is_lattice) {
+            return;
+        }
+        let lattice = planned.lattice();
         self.starts.push(self.photons.len());
         let photons = LatticePhotons {
             lattice,

@@ -5,11 +5,11 @@ mod common;
 
 use caustics_geometry::shapes::quad;
 use caustics_sampling::Sequence;
-use caustics_scene::{Instance, Light, Material, Scene, Shape};
+use caustics_scene::{Environment, Instance, Light, Material, Scene, Shape};
 use caustics_trace::glam::Vec3;
 use caustics_trace::{
     Aim, Casters, EmissionBatch, EmissionPlan, Fate, LightSource, Photon, PhotonMap, TraceOptions,
-    trace_photons, trace_plan,
+    trace_part, trace_photons, trace_plan,
 };
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
@@ -73,7 +73,7 @@ fn stored(scene: &Scene, aim: Aim, photons: u32) -> (f64, f64) {
 proptest! {
     #![proptest_config(ProptestConfig {
         failure_persistence: None,
-        ..ProptestConfig::with_cases(24)
+        ..ProptestConfig::with_cases(12)
     })]
 
     #[test]
@@ -90,6 +90,25 @@ proptest! {
         let allowed = 6.0 * error.hypot(other) + 2e-3 * unaimed;
         prop_assert!((aimed - unaimed).abs() < allowed, "{aimed} {unaimed} +- {allowed}");
     }
+}
+
+#[test]
+fn a_sky_lights_overlapping_casters_aimed_as_unaimed() {
+    let mut scene = heap(
+        &row(),
+        Light::point([0.0, 9.0, 0.0], [0.0; 3]).expect("valid"),
+    );
+    let pixels = (0..32 * 16).map(|it| [if it == 70 { 200.0 } else { 0.5 }; 3]);
+    let sky = Environment::new(32, 16, pixels.collect()).expect("a sky");
+    scene.set_environment(Some(sky));
+    let (aimed, error) = stored(&scene, Aim::Casters, 8_192);
+    let (unaimed, other) = stored(&scene, Aim::Everywhere, 65_536);
+    let allowed = 6.0 * error.hypot(other) + 2e-3 * unaimed;
+    println!("{aimed} {unaimed} +- {allowed}");
+    assert!(
+        (aimed - unaimed).abs() < allowed,
+        "{aimed} {unaimed} +- {allowed}"
+    );
 }
 
 /// Two glass balls, one behind the other as the lamp sees them, and a third that is only half
@@ -132,6 +151,39 @@ fn what_two_pairs_cover_is_booked_and_counted_once() {
         // Without the rule, the overlap would be a good part of the caustic.
         assert!(overlap.flux.x > 0.05 * ledger.entry(Fate::Stored).flux.x);
     }
+}
+
+#[test]
+fn parts_join_to_the_whole() {
+    let scene = apart(0.0);
+    let (world, intersector) = flattened(&scene);
+    let options = TraceOptions {
+        photons: 9_000,
+        // A part does not know the neighbours of its last photons.
+        check_footprints: false,
+        ..TraceOptions::default()
+    };
+    let plan = EmissionPlan::new(&world, &intersector, &options).expect("valid options");
+    let whole = trace_plan(&world, &intersector, &plan, &options, &|_| {}).expect("valid options");
+    let mut photons = Vec::new();
+    let mut rays = 0;
+    for start in (0..plan.count()).step_by(777) {
+        let part = trace_part(&world, &intersector, &plan, &options, start..start + 777);
+        let part = part.expect("valid options");
+        assert!(part.ledger.imbalance() < 1e-6);
+        photons.extend(part.photons);
+        rays += part.ledger.rays;
+    }
+    assert!(photons == whole.photons);
+    assert_eq!(rays, whole.ledger.rays);
+    let beyond = trace_part(
+        &world,
+        &intersector,
+        &plan,
+        &options,
+        plan.count()..u32::MAX,
+    );
+    assert!(beyond.expect("valid options").photons.is_empty());
 }
 
 #[test]

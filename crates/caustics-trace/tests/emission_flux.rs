@@ -7,9 +7,9 @@ use std::f64::consts::{PI, TAU};
 
 use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::{CounterRng, PointSet, Sequence};
-use caustics_scene::{Light, Material, Scene, World};
+use caustics_scene::{Environment, Light, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
-use caustics_trace::{Aim, Casters, Emission, EmissionSample, Emitter};
+use caustics_trace::{Aim, Casters, Emission, EmissionSample, Emitter, LightSource};
 use common::scenes::{add_floor, add_sphere};
 use proptest::prelude::*;
 
@@ -277,6 +277,38 @@ fn flat_lights_send_a_ball_what_the_closed_form_says() {
         }
         let (_, error) = flux_to_ball(&world, Aim::Casters, 100_000);
         assert!(error < 1e-3 * exact, "aimed photons vary by {error}");
+    }
+}
+
+/// On a ball falls the sky's radiance, integrated over all directions, times its cross-section.
+#[test]
+fn the_sky_sends_a_ball_its_total_times_the_cross_section() {
+    let (width, height) = (16, 8);
+    // Dim all around, with a spot that is a thousand times as bright.
+    let pixels = (0..width * height).map(|it| [if it == 21 { 1000.0 } else { 1.0 }; 3]);
+    let sky = Environment::new(width, height, pixels.collect()).expect("a sky");
+    let exact = PI * f64::from(BALL.radius).powi(2) * f64::from(sky.total().x);
+    let mut scene = Scene::new();
+    add_floor(&mut scene, -1.0, 3.0);
+    let glass = Material::dielectric("glass", 1.5);
+    add_sphere(&mut scene, BALL.center, BALL.radius, glass);
+    scene.set_environment(Some(sky));
+    let world = World::new(&scene).expect("a small world");
+    for aim in [Aim::Everywhere, Aim::Casters] {
+        let (flux, error) = flux_to_ball(&world, aim, 200_000);
+        println!("{flux:.5} +- {error:.1e}, exactly {exact:.5}: {aim:?}");
+        // Where photons miss the ball, which one in 60 does by the margin of its outline.
+        assert!((flux - exact).abs() < 4.0 * error + 1e-6 * exact, "{aim:?}");
+        let emitter = &emitters(&world, aim)[0];
+        assert_eq!(emitter.source(), LightSource::Environment);
+        let photons = random_photons(&world, emitter, 1000, 5);
+        // Importance: all carry the same flux, bright texel or dim.
+        let first = photons[0].flux.x;
+        assert!(
+            photons
+                .iter()
+                .all(|it| (it.flux.x / first - 1.0).abs() < 1e-4)
+        );
     }
 }
 

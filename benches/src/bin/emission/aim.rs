@@ -1,0 +1,143 @@
+//! Rays for the same error, aimed and not.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+
+use caustics::filter::{Image, relative_errors, relative_mse, trimmed_mean};
+use caustics::prelude::*;
+use caustics::render::{FootprintOptions, GBuffer, splat};
+use caustics::trace::{EmissionPlan, ProjectionMap, trace_photons};
+use caustics_benches::stage::{Failure, SCENES, Stage};
+
+/// Photons aimed at casters' outlines, whose error the others have to reach.
+const PHOTONS: u32 = 1 << 15;
+
+/// The most photons that are tried.
+const LIMIT: u32 = 1 << 23;
+
+/// The part of the worst pixels that is left out: single ones that no estimate finds would decide.
+const TRIM: f64 = 0.01;
+
+struct Traced {
+    image: Image,
+    error: f64,
+    rays: u64,
+    seconds: f64,
+}
+
+fn traced(stage: &Stage, buffer: &GBuffer, aim: Aim, photons: u32) -> Result<Traced, Failure> {
+    let options = TraceOptions {
+        photons,
+        aim,
+        ..TraceOptions::default()
+    };
+    let start = Instant::now();
+    let map = trace_photons(&stage.world, &stage.intersector, &options, &|_| {})?;
+    let seconds = start.elapsed().as_secs_f64();
+    let (image, _) = splat(buffer, &map.photons, &FootprintOptions::default())?;
+    Ok(Traced {
+        error: trimmed_mean(&relative_errors(&image, &stage.reference)?, TRIM),
+        image,
+        rays: map.ledger.rays,
+        seconds,
+    })
+}
+
+/// The least of a doubling number of photons that reaches an error, its rays interpolated between
+/// the last two on a logarithmic scale.
+fn reaching(
+    stage: &Stage,
+    buffer: &GBuffer,
+    aim: Aim,
+    error: f64,
+) -> Result<Option<(u64, f64)>, Failure> {
+    let mut before: Option<Traced> = None;
+    let mut photons = PHOTONS / 2;
+    while photons <= LIMIT {
+        let now = traced(stage, buffer, aim, photons)?;
+        if now.error <= error {
+            let Some(before) = before else {
+                return Ok(Some((now.rays, now.seconds)));
+            };
+            let part = (before.error / error).ln() / (before.error / now.error).ln();
+            let between = |a: f64, b: f64| a * (b / a).powf(part);
+            let rays = between(before.rays as f64, now.rays as f64);
+            return Ok(Some((rays as u64, between(before.seconds, now.seconds))));
+        }
+        before = Some(now);
+        photons *= 2;
+    }
+    Ok(None)
+}
+
+pub(crate) fn section() -> Result<String, Failure> {
+    let mut text = format!(
+        "## Aiming: rays for the same error\n\n\
+        {PHOTONS} photons aimed at the casters' outlines (projection maps where they pay), and how \
+        many times as many rays and seconds reach the same relMSE (of all but the worst 1 % of pixels) into cones around each caster, \
+        and everywhere. *Marked* is the part of the cones, or of the sun's rectangles, that the \
+        maps leave. *Apart* is the relMSE between the pictures of aimed and of unaimed photons, \
+        with as many of the latter as meet glass as often; the second is with eight times as many \
+        of both.\n\n\
+        | scene | marked | relMSE | million rays | seconds | rays, cones | rays, everywhere | \
+        seconds, everywhere | apart | of 8 times as many |\n\
+        | --- | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n"
+    );
+    for name in SCENES {
+        let stage = Stage::load(name)?;
+        let (width, height) = (stage.reference.width(), stage.reference.height());
+        let buffer = GBuffer::new(
+            &stage.world,
+            &stage.intersector,
+            &stage.camera,
+            width,
+            height,
+        )?;
+        let aimed = traced(&stage, &buffer, Aim::Casters, PHOTONS)?;
+        let options = TraceOptions {
+            photons: PHOTONS,
+            ..TraceOptions::default()
+        };
+        let plan = EmissionPlan::new(&stage.world, &stage.intersector, &options)?;
+        let (mut used, mut whole, mut flux, mut power) = (0.0, 0.0, 0.0, 0.0);
+        for batch in plan.batches() {
+            used += f64::from(batch.count());
+            whole += f64::from(batch.points().count());
+            let aimed = batch.emitter().aimed_power().element_sum();
+            flux += aimed * f64::from(batch.map().map_or(1.0, ProjectionMap::coverage));
+            power = batch.emitter().power().element_sum().max(power);
+        }
+        let times = |found: Option<(u64, f64)>| match found {
+            Some((rays, seconds)) => (
+                format!("{:.1}", rays as f64 / aimed.rays as f64),
+                format!("{:.1}", seconds / aimed.seconds),
+            ),
+            None => ("not reached".to_owned(), String::new()),
+        };
+        let (cone_rays, _) = times(reaching(&stage, &buffer, Aim::Cones, aimed.error)?);
+        let (all_rays, all_seconds) =
+            times(reaching(&stage, &buffer, Aim::Everywhere, aimed.error)?);
+        // As many photons as have the same density where they are aimed.
+        let mut apart = Vec::new();
+        for factor in [1.0, 8.0] {
+            let count = f64::from(PHOTONS) * factor;
+            let everywhere = (count * power / flux).min(f64::from(LIMIT));
+            let one = traced(&stage, &buffer, Aim::Casters, count as u32)?;
+            let other = traced(&stage, &buffer, Aim::Everywhere, everywhere as u32)?;
+            apart.push(relative_mse(&one.image, &other.image)?);
+        }
+        writeln!(
+            text,
+            "| {name} | {:.0} % | {:.4} | {:.2} | {:.2} | {cone_rays} | {all_rays} | \
+            {all_seconds} | {:.4} | {:.4} |",
+            100.0 * used / whole,
+            aimed.error,
+            aimed.rays as f64 / 1e6,
+            aimed.seconds,
+            apart[0],
+            apart[1],
+        )?;
+        eprintln!("  {name}");
+    }
+    Ok(text)
+}
