@@ -1,0 +1,40 @@
+//! Caustics on the GPU, inside a host's own wgpu frame.
+//!
+//! The host owns instance, device, queue, encoder and surface; what is here records compute and
+//! render passes into the host's encoder, and submits, polls and presents nothing.
+//!
+//! ```
+//! use caustics_trace::Photon;
+//! use caustics_wgpu::FootprintRecord;
+//! use caustics_wgpu::glam::Vec3;
+//!
+//! // The same landing of light, as the CPU keeps it and as the GPU does.
+//! let photon = Photon {
+//!     position: Vec3::ZERO,
+//!     incoming: Vec3::NEG_Y,
+//!     flux: Vec3::new(1.0, 2.0, 3.0),
+//!     normal: Vec3::Y,
+//!     axes: [0.1 * Vec3::X, 0.2 * Vec3::Z],
+//!     object: 7,
+//!     events: 2,
+//! };
+//! let record = FootprintRecord::from(&photon);
+//! assert_eq!(record.flux(), photon.flux);
+//! assert_eq!(size_of_val(&record), 80);
+//! ```
+//!
+//! # What is where
+//!
+//! | to | take |
+//! | --- | --- |
+//! | keep a photon where both sides can read it | [`FootprintRecord`] |
+//! | know what went wrong | [`GpuError`] |
+
+mod error;
+mod footprint_record;
+mod shader;
+
+pub use error::GpuError;
+pub use footprint_record::FootprintRecord;
+pub use glam;
+pub use wgpu;
