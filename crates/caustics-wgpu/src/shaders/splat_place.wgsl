@@ -25,6 +25,9 @@ struct SplatCounts {
     // Pairs of a footprint and a tile, and those of them for which there was no room.
     pairs: atomic<u32>,
     dropped_pairs: atomic<u32>,
+    // Footprints of this batch.
+    footprints: atomic<u32>,
+    pad: u32,
     by_level: array<atomic<u32>, 8>,
     level_cursor: array<atomic<u32>, 8>,
 }
@@ -76,11 +79,11 @@ fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
             if low >= bottom || high <= -bottom {
                 return vec2<u32>(0u);
             }
-            let from = max(low, -0.9999 * bottom);
-            let to = min(high, 0.9999 * bottom);
+            let above = max(low, -0.9999 * bottom);
+            let below = min(high, 0.9999 * bottom);
             let ends = vec2<f32>(
-                ellipse_span(place, clamp(-at_right, from, to)).x,
-                ellipse_span(place, clamp(at_right, from, to)).y,
+                ellipse_span(place, clamp(-at_right, above, below)).x,
+                ellipse_span(place, clamp(at_right, above, below)).y,
             ) + place.center.x;
             let most = vec2<f32>(columns);
             columns.x = u32(clamp(floor(ends.x - 1.5), most.x, most.y));

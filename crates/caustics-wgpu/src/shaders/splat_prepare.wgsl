@@ -1,4 +1,4 @@
-// Makes footprints ready for one view: density, level of resolution, pixels, tiles.
+// Makes footprints ready for one view: density, level of resolution, pixels.
 // CPU twin: `Splat::prepare` of caustics-render's `splat.rs`.
 
 // The least standard deviation, in pixels of a level, that may be splatted there.
@@ -7,11 +7,6 @@ const LEVEL_SIGMA: f32 = 2.0;
 const SMALL_SIGMA: f32 = 0.9;
 // Footprints longer than this many pixels are not summed.
 const SUMMED_EXTENT: f32 = 64.0;
-
-struct Screen {
-    // In pixels, with the depth along the view as z; not in front of the eye where it is not positive.
-    at: vec3<f32>,
-}
 
 struct PixelAxes {
     x: vec3<f32>,
@@ -30,12 +25,12 @@ struct Bounds {
 @group(0) @binding(2) var<storage, read> footprint_count: array<u32>;
 @group(0) @binding(3) var<storage, read_write> densities: array<StoredDensity>;
 @group(0) @binding(4) var<storage, read_write> places: array<SplatPlace>;
-@group(0) @binding(5) var<storage, read_write> tile_counts: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read_write> counts: SplatCounts;
-@group(0) @binding(7) var<storage, read_write> peak_sums: array<f32>;
+@group(0) @binding(5) var<storage, read_write> counts: SplatCounts;
+@group(0) @binding(6) var<storage, read_write> peak_sums: array<f32>;
 
 var<workgroup> peaks: array<f32, 256>;
 
+// In pixels, with the depth along the view as z: behind the eye where it is not positive.
 fn project(point: vec3<f32>) -> vec3<f32> {
     let clip = view.view_projection * vec4<f32>(point, 1.0);
     let ndc = clip.xy / clip.w;
@@ -190,6 +185,9 @@ fn splat_prepare(
     @builtin(workgroup_id) group: vec3<u32>,
 ) {
     let count = min(footprint_count[0], arrayLength(&footprints));
+    if id.x == 0u {
+        atomicStore(&counts.footprints, count);
+    }
     var peak = 0.0;
     if id.x < count {
         peak = prepare(id.x);
@@ -211,22 +209,5 @@ fn splat_prepare(
             sum += peaks[16u * i];
         }
         peak_sums[group.x] = sum;
-    }
-}
-
-// Counts, for each tile, the footprints that may light a pixel of it.
-@compute @workgroup_size(256)
-fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= min(footprint_count[0], arrayLength(&footprints)) {
-        return;
-    }
-    let place = places[id.x];
-    let level = view.levels[place.level];
-    let rows = tile_rows(place);
-    for (var row = rows.x; row < rows.y; row++) {
-        let columns = tile_columns(place, row);
-        for (var column = columns.x; column < columns.y; column++) {
-            atomicAdd(&tile_counts[level.w + row * level.z + column], 1u);
-        }
     }
 }

@@ -22,7 +22,6 @@ const SMALL_AREA: u32 = 64u;
 var<workgroup> positions: array<vec3<f32>, 256>;
 var<workgroup> normals: array<vec3<f32>, 256>;
 var<workgroup> sums: array<atomic<u32>, 768>;
-var<workgroup> bounds: array<vec3<f32>, 256>;
 var<workgroup> large: array<u32, 256>;
 var<workgroup> large_count: atomic<u32>;
 var<workgroup> list: vec2<u32>;
@@ -70,22 +69,32 @@ fn splat_tiles(
         for (var i = range.x + local; i < range.y; i += 256u) {
             bound += densities[pairs[i]].strength;
         }
-        bounds[local] = bound;
+        atomicStore(&sums[local], bitcast<u32>(bound.x));
+        atomicStore(&sums[local + 256u], bitcast<u32>(bound.y));
+        atomicStore(&sums[local + 512u], bitcast<u32>(bound.z));
+        workgroupBarrier();
+        if local < 48u {
+            // A sixteenth of one channel.
+            var part = 0.0;
+            for (var i = 0u; i < 16u; i++) {
+                part += bitcast<f32>(atomicLoad(&sums[16u * local + i]));
+            }
+            atomicStore(&sums[16u * local], bitcast<u32>(part));
+        }
+        workgroupBarrier();
+        bound = vec3<f32>(0.0);
+        for (var i = 0u; i < 256u; i += 16u) {
+            bound += bitcast<vec3<f32>>(vec3<u32>(
+                atomicLoad(&sums[i]),
+                atomicLoad(&sums[i + 256u]),
+                atomicLoad(&sums[i + 512u]),
+            ));
+        }
+        workgroupBarrier();
         atomicStore(&sums[local], 0u);
         atomicStore(&sums[local + 256u], 0u);
         atomicStore(&sums[local + 512u], 0u);
         workgroupBarrier();
-        if local < 16u {
-            for (var i = 1u; i < 16u; i++) {
-                bound += bounds[local + 16u * i];
-            }
-            bounds[local] = bound;
-        }
-        workgroupBarrier();
-        bound = bounds[0];
-        for (var i = 1u; i < 16u; i++) {
-            bound += bounds[i];
-        }
         bound *= kernel_peak();
         // A little less, for the rounding of this sum and of each part.
         let room = 4294000000.0 - 2.0 * f32(count);
