@@ -30,12 +30,17 @@
 //! | keep a photon where both sides can read it | [`FootprintRecord`] |
 //! | know what went wrong | [`GpuError`] |
 
+mod camera_matrix;
+mod capabilities;
+mod composite;
 mod error;
 mod error_scope;
 mod footprint_record;
 mod pass_layout;
+mod pass_times;
 mod prefix_sum;
 mod recorder;
+mod renderer;
 mod renderer_error;
 mod shader;
 mod splat;
@@ -46,13 +51,20 @@ mod splat_stats;
 mod splat_targets;
 mod splat_tiles;
 mod splat_view;
+mod view_params;
 
+pub use camera_matrix::camera_matrix;
+pub use capabilities::Capabilities;
+pub use composite::CompositeTarget;
 pub use error::GpuError;
 pub use footprint_record::FootprintRecord;
 pub use glam;
+pub use pass_times::{FrameTimestamps, PassTime};
 pub use recorder::RecordedWork;
+pub use renderer::{CausticsRenderer, FrameParams, PreparedFrame, RendererOptions};
 pub use renderer_error::{MissingLimit, RendererError};
 pub use splat_options::{SplatKernel, SplatMethod, SplatOptions};
 pub use splat_scratch::FootprintBatch;
 pub use splat_stats::SplatStats;
+pub use view_params::{NormalEncoding, SurfaceInput, ViewParams};
 pub use wgpu;

@@ -83,22 +83,6 @@ impl SplatScratch {
             crate::SplatMethod::Quads => u64::from(capacity),
         }
     }
-
-    /// Bytes that it occupies.
-    pub(crate) fn bytes(&self) -> u64 {
-        [
-            &self.densities,
-            &self.places,
-            &self.tile_counts,
-            &self.tile_starts,
-            &self.pairs,
-            &self.peak_sums,
-            &self.draws,
-        ]
-        .map(wgpu::Buffer::size)
-        .iter()
-        .sum()
-    }
 }
 
 /// Footprints in buffers of the GPU: [`FootprintRecord`]s, and a buffer whose first word is their
