@@ -31,10 +31,28 @@
 //! | know what went wrong | [`GpuError`] |
 
 mod error;
+mod error_scope;
 mod footprint_record;
+mod pass_layout;
+mod prefix_sum;
+mod recorder;
+mod renderer_error;
 mod shader;
+mod splat;
+mod splat_options;
+mod splat_quads;
+mod splat_scratch;
+mod splat_stats;
+mod splat_targets;
+mod splat_tiles;
+mod splat_view;
 
 pub use error::GpuError;
 pub use footprint_record::FootprintRecord;
 pub use glam;
+pub use recorder::RecordedWork;
+pub use renderer_error::{MissingLimit, RendererError};
+pub use splat_options::{SplatKernel, SplatMethod, SplatOptions};
+pub use splat_scratch::FootprintBatch;
+pub use splat_stats::SplatStats;
 pub use wgpu;

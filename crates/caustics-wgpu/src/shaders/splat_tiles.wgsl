@@ -1,0 +1,155 @@
+// Sums the footprints of each tile of 16 by 16 pixels in workgroup memory, in fixed point: the sum
+// does not depend on the order, so the same frame gives the same bits.
+//
+// One count is the 2^32nd part of the sum of the peaks of all footprints on the tile, which no pixel
+// can exceed: nothing overflows. A pixel errs by half a count for each footprint on it.
+// CPU twin: `BandTask` of caustics-render's `splat_level.rs`.
+
+@group(0) @binding(0) var<uniform> view: SplatView;
+@group(0) @binding(1) var<uniform> step: SplatStep;
+@group(0) @binding(2) var<storage, read> densities: array<StoredDensity>;
+@group(0) @binding(3) var<storage, read> places: array<SplatPlace>;
+@group(0) @binding(4) var<storage, read> tile_starts: array<u32>;
+@group(0) @binding(5) var<storage, read> pairs: array<u32>;
+@group(0) @binding(6) var texels: texture_2d<u32>;
+@group(0) @binding(7) var before: texture_2d_array<f32>;
+@group(0) @binding(8) var irradiance_out: texture_storage_2d<rgba32float, write>;
+
+// Footprints that fill up to so many pixels of a tile are summed by one thread each, larger ones by
+// all threads together, each for its pixel.
+const SMALL_AREA: u32 = 64u;
+
+var<workgroup> positions: array<vec3<f32>, 256>;
+var<workgroup> normals: array<vec3<f32>, 256>;
+var<workgroup> sums: array<atomic<u32>, 768>;
+var<workgroup> large: array<u32, 256>;
+var<workgroup> large_count: atomic<u32>;
+var<workgroup> list: vec2<u32>;
+
+// The pixels of the tile that a footprint may light: from, and up to but not at.
+fn clipped(place: SplatPlace, corner: vec2<u32>) -> vec4<u32> {
+    let columns = clamp(range_of(place.columns), vec2<u32>(corner.x), vec2<u32>(corner.x + TILE));
+    let rows = clamp(range_of(place.rows), vec2<u32>(corner.y), vec2<u32>(corner.y + TILE));
+    return vec4<u32>(columns - corner.x, rows - corner.y);
+}
+
+@compute @workgroup_size(256)
+fn splat_tiles(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let level = view.levels[step.level];
+    let corner = TILE * group.xy;
+    let pixel = corner + vec2<u32>(local % TILE, local / TILE);
+    let is_inside = all(pixel < level.xy);
+    var position = vec3<f32>(0.0);
+    var normal = vec3<f32>(0.0);
+    if is_inside {
+        let texel = textureLoad(texels, vec2<i32>(pixel), 0);
+        if texel.w != NO_RECEIVER {
+            position = bitcast<vec3<f32>>(texel.xyz);
+            normal = decode_octahedral(texel.w);
+        }
+    }
+    positions[local] = position;
+    normals[local] = normal;
+    if local == 0u {
+        let tile = level.w + group.y * level.z + group.x;
+        let room = arrayLength(&pairs);
+        list = min(vec2<u32>(tile_starts[tile], tile_starts[tile + 1u]), vec2<u32>(room));
+        atomicStore(&large_count, 0u);
+    }
+    let range = workgroupUniformLoad(&list);
+    let count = range.y - range.x;
+
+    var result = vec3<f32>(0.0);
+    if count > 0u {
+        // The bound of all sums, and with it the unit.
+        var bound = vec3<f32>(0.0);
+        for (var i = range.x + local; i < range.y; i += 256u) {
+            bound += densities[pairs[i]].strength;
+        }
+        atomicStore(&sums[local], bitcast<u32>(bound.x));
+        atomicStore(&sums[local + 256u], bitcast<u32>(bound.y));
+        atomicStore(&sums[local + 512u], bitcast<u32>(bound.z));
+        workgroupBarrier();
+        if local < 48u {
+            // A sixteenth of one channel.
+            var part = 0.0;
+            for (var i = 0u; i < 16u; i++) {
+                part += bitcast<f32>(atomicLoad(&sums[16u * local + i]));
+            }
+            atomicStore(&sums[16u * local], bitcast<u32>(part));
+        }
+        workgroupBarrier();
+        bound = vec3<f32>(0.0);
+        for (var i = 0u; i < 256u; i += 16u) {
+            bound += bitcast<vec3<f32>>(vec3<u32>(
+                atomicLoad(&sums[i]),
+                atomicLoad(&sums[i + 256u]),
+                atomicLoad(&sums[i + 512u]),
+            ));
+        }
+        workgroupBarrier();
+        atomicStore(&sums[local], 0u);
+        atomicStore(&sums[local + 256u], 0u);
+        atomicStore(&sums[local + 512u], 0u);
+        workgroupBarrier();
+        bound *= kernel_peak();
+        // A little less, for the rounding of this sum and of each part.
+        let room = 4294000000.0 - 2.0 * f32(count);
+        let unit = select(vec3<f32>(0.0), room / bound, bound > vec3<f32>(0.0));
+
+        var own = vec3<u32>(0u);
+        for (var base = range.x; base < range.y; base += 256u) {
+            if base + local < range.y {
+                let index = pairs[base + local];
+                let place = places[index];
+                let box = clipped(place, corner);
+                if (box.y - box.x) * (box.w - box.z) <= SMALL_AREA {
+                    let stored = densities[index];
+                    let plane = decode_octahedral(stored.normal);
+                    let incoming = decode_octahedral(stored.incoming);
+                    for (var y = box.z; y < box.w; y++) {
+                        for (var x = box.x; x < box.y; x++) {
+                            let at = TILE * y + x;
+                            let weight = density_weight(stored, plane, incoming, positions[at], normals[at]);
+                            if weight > 0.0 {
+                                let part = vec3<u32>(unit * stored.strength * weight + 0.5);
+                                atomicAdd(&sums[at], part.x);
+                                atomicAdd(&sums[at + 256u], part.y);
+                                atomicAdd(&sums[at + 512u], part.z);
+                            }
+                        }
+                    }
+                } else {
+                    large[atomicAdd(&large_count, 1u)] = index;
+                }
+            }
+            workgroupBarrier();
+            let larges = atomicLoad(&large_count);
+            for (var i = 0u; i < larges; i++) {
+                let stored = densities[large[i]];
+                let plane = decode_octahedral(stored.normal);
+                let incoming = decode_octahedral(stored.incoming);
+                let weight = density_weight(stored, plane, incoming, position, normal);
+                own += vec3<u32>(unit * stored.strength * weight + 0.5);
+            }
+            workgroupBarrier();
+            if local == 0u {
+                atomicStore(&large_count, 0u);
+            }
+            workgroupBarrier();
+        }
+        own.x += atomicLoad(&sums[local]);
+        own.y += atomicLoad(&sums[local + 256u]);
+        own.z += atomicLoad(&sums[local + 512u]);
+        result = select(vec3<f32>(0.0), vec3<f32>(own) / unit, unit > vec3<f32>(0.0));
+    }
+    if is_inside {
+        if step.is_first == 0u {
+            result += textureLoad(before, vec2<i32>(pixel), 0, 0).xyz;
+        }
+        textureStore(irradiance_out, vec2<i32>(pixel), vec4<f32>(result, 0.0));
+    }
+}
