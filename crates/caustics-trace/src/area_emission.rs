@@ -6,6 +6,7 @@ use caustics_scene::{AreaLight, World};
 use glam::{Vec2, Vec3};
 
 use crate::emission::{Emission, EmissionSample, differential};
+use crate::emitter_domain::EmitterDomain;
 
 /// How wide a photon's share is taken, of a four-dimensional cell that no other has.
 ///
@@ -39,6 +40,14 @@ impl<'a> AreaDomain<'a> {
             light,
             front,
             target,
+        }
+    }
+
+    pub(crate) fn domain(&self) -> EmitterDomain<'a> {
+        EmitterDomain::Area {
+            light: self.light,
+            front: self.front,
+            target: self.target,
         }
     }
 

@@ -1,12 +1,13 @@
 use caustics_geometry::{Frame, Ray};
-use caustics_sampling::PointSet;
 use caustics_sampling::warp::{Cone, WarpSample, square_to_sphere_octahedral};
+use caustics_sampling::{PointSet, apportion};
 use caustics_scene::{AreaLight, Light, World};
 use glam::{DVec3, Vec2, Vec3};
 
 use crate::aim::Casters;
 use crate::area_emission::AreaDomain;
 use crate::differential::RayDifferential;
+use crate::emitter_domain::EmitterDomain;
 use crate::options::Aim;
 
 /// A photon as it leaves its light.
@@ -105,6 +106,20 @@ impl<'a> Emitter<'a> {
         emitters
     }
 
+    /// How many of `total` photons each emitter gets, in proportion to its aimed power. The photons
+    /// of all are numbered in this order, from 0.
+    #[must_use]
+    pub fn share(emitters: &[Self], total: u32) -> Vec<u32> {
+        let weights: Vec<f64> = emitters
+            .iter()
+            .map(|it| it.aimed_power().element_sum())
+            .collect();
+        apportion(&weights, total as usize).map_or_else(
+            |_| vec![0; emitters.len()],
+            |counts| counts.into_iter().map(|it| it as u32).collect(),
+        )
+    }
+
     /// Everything that the light emits, in watts; for a directional light, onto the bounding
     /// sphere of the scene.
     #[must_use]
@@ -198,6 +213,41 @@ impl<'a> Emitter<'a> {
             }
             Domain::Area(area) => area.emit(sample),
             Domain::Nothing => None,
+        }
+    }
+
+    /// The rays that it sends out, for those who make the photons elsewhere.
+    #[must_use]
+    pub fn domain(&self) -> EmitterDomain<'a> {
+        match &self.domain {
+            Domain::Sphere { light, origin } => EmitterDomain::Sphere {
+                light,
+                origin: *origin,
+            },
+            Domain::Cone {
+                light,
+                origin,
+                frame,
+                cone,
+            } => EmitterDomain::Cone {
+                light,
+                origin: *origin,
+                frame: *frame,
+                cone: *cone,
+            },
+            Domain::Rectangle {
+                corner,
+                edges,
+                direction,
+                irradiance,
+            } => EmitterDomain::Rectangle {
+                corner: *corner,
+                edges: *edges,
+                direction: *direction,
+                irradiance: *irradiance,
+            },
+            Domain::Area(area) => area.domain(),
+            Domain::Nothing => EmitterDomain::Nothing,
         }
     }
 

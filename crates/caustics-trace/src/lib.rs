@@ -57,6 +57,7 @@
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
 //! | aim lights at what makes caustics | [`Aim`], [`Emitter`], [`Emission`], [`EmissionSample`] | |
+//! | make the same photons elsewhere, or follow one of them alone | [`EmitterDomain`], [`trace_photon`], [`PhotonTrail`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
@@ -111,6 +112,7 @@ mod aim;
 mod area_emission;
 mod differential;
 mod emission;
+mod emitter_domain;
 mod ledger;
 mod media;
 mod optics;
@@ -123,6 +125,7 @@ mod tracer;
 
 pub use differential::RayDifferential;
 pub use emission::{Emission, EmissionSample, Emitter};
+pub use emitter_domain::EmitterDomain;
 pub use glam;
 pub use ledger::{EnergyLedger, Fate, LedgerEntry};
 pub use media::{Crossing, MediumStack};
@@ -133,4 +136,4 @@ pub use optics::{
 pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
 pub use photon::{Photon, PhotonMap};
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::trace_photons;
+pub use trace::{PhotonTrail, trace_photon, trace_photons};

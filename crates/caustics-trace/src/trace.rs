@@ -1,11 +1,12 @@
 use caustics_accel::Intersect;
-use caustics_sampling::{CounterRng, PointSet, Sequence, apportion};
+use caustics_sampling::{CounterRng, PointSet, Sequence};
 use caustics_scene::World;
 
-use crate::emission::{EmissionSample, Emitter};
+use crate::emission::{Emission, EmissionSample, Emitter};
+use crate::ledger::EnergyLedger;
 use crate::media::MediumStack;
 use crate::options::{TraceError, TraceOptions};
-use crate::photon::PhotonMap;
+use crate::photon::{Photon, PhotonMap};
 use crate::refine::trace_refined;
 use crate::tracer::PathTracer;
 
@@ -29,7 +30,7 @@ pub fn trace_photons<I: Intersect + ?Sized>(
 ) -> Result<PhotonMap, TraceError> {
     options.validate()?;
     let emitters = Emitter::all(world, options.aim);
-    let counts = share(&emitters, options.photons);
+    let counts = Emitter::share(&emitters, options.photons);
     let mut map = PhotonMap::default();
     let mut first = 0u32;
     for (emitter, &count) in emitters.iter().zip(&counts) {
@@ -64,16 +65,43 @@ pub fn trace_photons<I: Intersect + ?Sized>(
     Ok(map)
 }
 
-/// How many of `total` photons each emitter gets.
-fn share(emitters: &[Emitter<'_>], total: u32) -> Vec<u32> {
-    let weights: Vec<f64> = emitters
-        .iter()
-        .map(|it| it.aimed_power().element_sum())
-        .collect();
-    apportion(&weights, total as usize).map_or_else(
-        |_| vec![0; emitters.len()],
-        |counts| counts.into_iter().map(|it| it as u32).collect(),
-    )
+/// What one emitted photon came to, as [`trace_photon`] returns it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PhotonTrail {
+    /// Its parts that were stored, in the order in which they landed.
+    pub photons: Vec<Photon>,
+    /// For each of them, a hash of the objects that it met and of what it did there. Photons of one
+    /// path are parts of one smooth sheet of light.
+    pub paths: Vec<u32>,
+    /// Where its energy went.
+    pub ledger: EnergyLedger,
+}
+
+/// Follows one photon and all its branches, as [`trace_photons`] does for all: for hosts that emit
+/// photons of their own, and for comparing tracers photon by photon.
+///
+/// `media` are those around its start, `number` is its number among the photons of all lights, which
+/// chooses its random numbers. Of the options, those that concern emission are not used.
+///
+/// # Errors
+/// If the options are out of range.
+pub fn trace_photon<I: Intersect + ?Sized, const N: usize>(
+    world: &World,
+    intersect: &I,
+    options: &TraceOptions,
+    emission: &Emission<N>,
+    media: MediumStack,
+    number: u32,
+) -> Result<PhotonTrail, TraceError> {
+    options.validate()?;
+    let mut tracer = PathTracer::<I, N>::new(world, intersect, options);
+    let mut rng = CounterRng::new(options.seed, u64::from(number));
+    tracer.trace(emission, media, &mut rng);
+    Ok(PhotonTrail {
+        photons: tracer.photons,
+        paths: tracer.paths,
+        ledger: tracer.ledger,
+    })
 }
 
 /// The photons of one emitter.

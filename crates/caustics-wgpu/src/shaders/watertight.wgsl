@@ -1,0 +1,89 @@
+// The watertight triangle test of Woop, Benthin and Wald 2013. Twin: watertight.rs in
+// caustics-geometry.
+//
+// A product that is rounded by itself keeps the guarantee that a ray through a shared edge hits one
+// of its triangles; see rounding.wgsl. Where all edge functions vanish the twin computes in f64.
+// Here they are computed again in coordinates scaled to 1, which is enough where the triangle was
+// too small for f32; one seen edge-on is left to its neighbours.
+
+struct ShearedRay {
+    origin: vec3<f32>,
+    shear: vec3<f32>,
+    // The axis that becomes z: 0, 1 or 2.
+    axis: u32,
+}
+
+fn to_z(p: vec3<f32>, axis: u32) -> vec3<f32> {
+    if axis == 0u {
+        return p.yzx;
+    }
+    if axis == 1u {
+        return p.zxy;
+    }
+    return p;
+}
+
+fn sheared_ray(ray: Ray) -> ShearedRay {
+    let size = abs(ray.direction);
+    var axis = 2u;
+    if size.x > size.y && size.x > size.z {
+        axis = 0u;
+    } else if size.y > size.z {
+        axis = 1u;
+    }
+    let direction = to_z(ray.direction, axis);
+    let shear = vec3(direction.x / direction.z, direction.y / direction.z, 1.0 / direction.z);
+    return ShearedRay(ray.origin, shear, axis);
+}
+
+fn sheared(ray: ShearedRay, vertex: vec3<f32>) -> vec3<f32> {
+    let p = to_z(vertex - ray.origin, ray.axis);
+    return vec3(p.x - rounded(ray.shear.x * p.z), p.y - rounded(ray.shear.y * p.z), p.z);
+}
+
+fn edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
+    return rounded(p.x * q.y) - rounded(p.y * q.x);
+}
+
+// Where the ray meets the triangle, with `t` not above 0 where it does not.
+fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c_world: vec3<f32>) -> vec3<f32> {
+    let missed = vec3(-1.0);
+    var a = sheared(ray, a_world);
+    var b = sheared(ray, b_world);
+    var c = sheared(ray, c_world);
+    let depth = vec3(a.z, b.z, c.z);
+    var weights = vec3(
+        edge_function(c.xy, b.xy),
+        edge_function(a.xy, c.xy),
+        edge_function(b.xy, a.xy),
+    );
+    if any(weights < vec3(0.0)) && any(weights > vec3(0.0)) {
+        return missed;
+    }
+    var sum = weights.x + weights.y + weights.z;
+    if abs(sum) < SMALLEST_NORMAL {
+        let size = max(
+            max(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y))),
+            max(abs(c.x), abs(c.y)),
+        );
+        if !(size > 0.0) {
+            return missed;
+        }
+        let scale = 1.0 / size;
+        weights = vec3(
+            edge_function(scale * c.xy, scale * b.xy),
+            edge_function(scale * a.xy, scale * c.xy),
+            edge_function(scale * b.xy, scale * a.xy),
+        );
+        sum = weights.x + weights.y + weights.z;
+        let crosses = any(weights < vec3(0.0)) && any(weights > vec3(0.0));
+        if crosses || abs(sum) < SMALLEST_NORMAL {
+            return missed;
+        }
+    }
+    let inverse = 1.0 / sum;
+    let u = weights.y * inverse;
+    let v = weights.z * inverse;
+    let along = weights.x * inverse * depth.x + u * depth.y + v * depth.z;
+    return vec3(along * ray.shear.z, u, v);
+}
