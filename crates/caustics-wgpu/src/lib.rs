@@ -30,13 +30,19 @@
 //! | keep a photon where both sides can read it | [`FootprintRecord`] |
 //! | know what went wrong | [`GpuError`] |
 
+mod body_order;
 mod error;
 mod error_scope;
 mod footprint_record;
+mod gpu_scene;
 mod pass_layout;
+mod photon_buffers;
+mod photon_tracer;
 mod prefix_sum;
 mod recorder;
 mod renderer_error;
+mod scene_buffers;
+mod scene_hierarchy;
 mod shader;
 mod splat;
 mod splat_options;
@@ -46,13 +52,21 @@ mod splat_stats;
 mod splat_targets;
 mod splat_tiles;
 mod splat_view;
+mod trace_counters;
+mod trace_params;
+mod trace_plan;
 
 pub use error::GpuError;
 pub use footprint_record::FootprintRecord;
 pub use glam;
+pub use photon_buffers::PhotonBuffers;
+pub use photon_tracer::PhotonTracer;
 pub use recorder::RecordedWork;
 pub use renderer_error::{MissingLimit, RendererError};
+pub use scene_buffers::SceneBuffers;
 pub use splat_options::{SplatKernel, SplatMethod, SplatOptions};
 pub use splat_scratch::FootprintBatch;
 pub use splat_stats::SplatStats;
+pub use trace_counters::TraceCounters;
+pub use trace_plan::TracePlan;
 pub use wgpu;
