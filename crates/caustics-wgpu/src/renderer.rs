@@ -4,17 +4,22 @@ use crate::capabilities::{self, Capabilities, REQUIRED_FEATURES, USED_FEATURES};
 use crate::composite::{Composite, CompositePass, CompositeTarget};
 use crate::error_scope::{caught, filled_buffer};
 use crate::pass_times::{FrameTimestamps, PassTimer};
+use crate::photon_buffers::PhotonBuffers;
+use crate::photon_tracer::PhotonTracer;
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
+use crate::scene_buffers::SceneBuffers;
 use crate::splat::{Receivers, Splat};
 use crate::splat_options::SplatOptions;
 use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SplatScratch};
-use crate::splat_targets::SplatTargets;
+use crate::splat_targets::{SplatTargets, SumFormat};
+use crate::splat_view::levels;
+use crate::trace_plan::TracePlan;
 use crate::view_params::{SurfaceInput, ViewParams};
 use crate::{FootprintRecord, GpuError};
 
 /// How a renderer is made.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct RendererOptions {
     /// How footprints become pixels.
     pub splat: SplatOptions,
@@ -23,13 +28,43 @@ pub struct RendererOptions {
     pub targets: Vec<CompositeTarget>,
     /// Whether passes write timestamps, where the device can.
     pub times_passes: bool,
+    /// Room for landings of each traced photon: a photon is split where glass both reflects and
+    /// refracts, and stores two to four in common scenes. What has no room is counted as crowded
+    /// by [`TraceCounters`](crate::TraceCounters).
+    pub records_per_photon: u32,
+}
+
+impl Default for RendererOptions {
+    fn default() -> Self {
+        Self {
+            splat: SplatOptions::default(),
+            targets: Vec::new(),
+            times_passes: false,
+            records_per_photon: 4,
+        }
+    }
+}
+
+/// Where a frame's light comes from.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum FrameLight<'a> {
+    /// Footprints that the host has in buffers.
+    Footprints(&'a [FootprintBatch<'a>]),
+    /// Photons that are traced on the GPU in this frame.
+    Traced {
+        /// What they are traced through.
+        scene: &'a SceneBuffers,
+        /// The photons of all lights. A light that moves needs a new plan.
+        plan: &'a TracePlan,
+    },
 }
 
 /// What changes from frame to frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameParams<'a> {
     /// The light.
-    pub footprints: &'a [FootprintBatch<'a>],
+    pub light: FrameLight<'a>,
     /// Every view of the frame, in the same order each frame: a view's textures are kept by its
     /// place, and made anew when its size changes.
     pub views: &'a [ViewParams<'a>],
@@ -44,6 +79,9 @@ pub struct FrameParams<'a> {
 pub struct CausticsRenderer {
     splat: Splat,
     composite: CompositePass,
+    tracer: PhotonTracer,
+    records_per_photon: u32,
+    photons: Vec<PhotonBuffers>,
     views: Vec<SplatTargets>,
     scratch: Option<SplatScratch>,
     timer: Option<PassTimer>,
@@ -54,6 +92,7 @@ pub struct CausticsRenderer {
 #[derive(Debug)]
 pub struct PreparedFrame {
     views: Vec<PreparedView>,
+    photons: Vec<PhotonBuffers>,
     timestamps: Option<FrameTimestamps>,
     work: RecordedWork,
 }
@@ -92,6 +131,13 @@ impl CausticsRenderer {
     /// target that cannot be blended into, and a device that is lost or out of memory.
     pub fn new(device: &wgpu::Device, options: &RendererOptions) -> Result<Self, RendererError> {
         options.splat.validate()?;
+        if !(1..=64).contains(&options.records_per_photon) {
+            return Err(RendererError::OptionOutOfRange {
+                name: "records_per_photon",
+                value: options.records_per_photon as f32,
+                range: "1 to 64",
+            });
+        }
         capabilities::check(device)?;
         caught(device, || {
             let splat = Splat::new(device, &options.splat)?;
@@ -107,6 +153,9 @@ impl CausticsRenderer {
             Ok(Self {
                 composite: CompositePass::new(device, &options.targets)?,
                 splat,
+                tracer: PhotonTracer::new(device),
+                records_per_photon: options.records_per_photon,
+                photons: Vec::new(),
                 views: Vec::new(),
                 scratch: None,
                 timer,
@@ -144,12 +193,31 @@ impl CausticsRenderer {
             .map(|(index, view)| view.uniform(index, &options, max_texture))
             .collect::<Result<Vec<_>, _>>()?;
         caught(device, || {
-            self.fit(device, frame)?;
+            if let FrameLight::Traced { plan, .. } = frame.light {
+                self.fit_photons(device, plan.photons())?;
+            }
+            let traced: Vec<_> = self.photons.iter().map(FootprintBatch::from).collect();
+            let footprints = match frame.light {
+                FrameLight::Footprints(batches) => batches,
+                FrameLight::Traced { .. } => &traced,
+            };
+            fit_scratch(&mut self.scratch, &self.splat, device, frame, footprints)?;
+            fit_views(&mut self.views, self.splat.format(), device, frame)?;
             let Some(scratch) = &self.scratch else {
                 return Err(RendererError::OutOfMemory);
             };
             let queries = self.timer.as_ref().map(|timer| &timer.queries);
             let mut recorder = Recorder::new(encoder, queries);
+            if let FrameLight::Traced { scene, plan } = frame.light {
+                let mut first = 0;
+                for into in &self.photons {
+                    into.clear(recorder.encoder);
+                    let last = plan.photons().min(first + into.photons());
+                    self.tracer
+                        .record(device, &mut recorder, scene, plan, first..last, into)?;
+                    first = last;
+                }
+            }
             let mut views = Vec::with_capacity(frame.views.len());
             for ((view, uniform), targets) in frame.views.iter().zip(&uniforms).zip(&mut self.views)
             {
@@ -172,7 +240,7 @@ impl CausticsRenderer {
                     &receivers,
                     targets,
                     scratch,
-                    frame.footprints,
+                    footprints,
                 )?;
                 let composite = Composite {
                     origin: view.origin,
@@ -192,6 +260,10 @@ impl CausticsRenderer {
             let period = queue.get_timestamp_period();
             Ok(PreparedFrame {
                 views,
+                photons: match frame.light {
+                    FrameLight::Footprints(_) => Vec::new(),
+                    FrameLight::Traced { .. } => self.photons.clone(),
+                },
                 timestamps: self
                     .timer
                     .as_ref()
@@ -216,45 +288,84 @@ impl CausticsRenderer {
             .draw(pass, &frame.view(view)?.composite, target)
     }
 
-    /// Makes what is missing or too small.
-    fn fit(&mut self, device: &wgpu::Device, frame: &FrameParams<'_>) -> Result<(), RendererError> {
-        let format = self.splat.format();
-        self.views.truncate(frame.views.len());
-        for (index, view) in frame.views.iter().enumerate() {
-            let size = UVec2::from(view.size);
-            if self.views.get(index).is_none_or(|it| it.size != size) {
-                let targets = SplatTargets::new(device, size, format)?;
-                self.views.truncate(index);
-                self.views.push(targets);
-            }
-        }
-        let capacity = frame.footprints.iter().map(FootprintBatch::capacity);
-        let capacity = capacity.max().unwrap_or(0).max(1);
+    /// Makes room for the landings of so many photons, in as few batches as bindings allow.
+    fn fit_photons(&mut self, device: &wgpu::Device, photons: u32) -> Result<(), RendererError> {
         let most = footprints_per_batch(&device.limits());
-        if capacity > most {
-            let record = size_of::<FootprintRecord>() as u64;
-            return Err(RendererError::Gpu(GpuError::BufferTooLarge {
-                what: "the footprints of a batch",
-                bytes: u64::from(capacity) * record,
-                limit: u64::from(most) * record,
-            }));
-        }
-        let tiles = self.views.iter().map(|view| view.tiles).max().unwrap_or(0);
-        let fits = |it: &SplatScratch| it.capacity >= capacity && it.tiles >= tiles;
-        if !self.scratch.as_ref().is_some_and(fits) {
-            let pairs = SplatScratch::pairs(self.splat.options(), capacity);
-            // Before the new one is made, so that there is memory for it.
-            self.scratch = None;
-            self.scratch = Some(SplatScratch::new(
-                device,
-                capacity,
-                tiles,
-                pairs,
-                format.layers,
-            )?);
+        let batch = (most / self.records_per_photon).clamp(1, photons.max(1));
+        let count = photons.div_ceil(batch).max(1);
+        let room: u32 = self.photons.iter().map(PhotonBuffers::photons).sum();
+        let is_right = self.photons.len() == count as usize
+            && self.photons.iter().all(|it| it.photons() <= batch)
+            && room >= photons
+            && room <= photons.saturating_mul(2).max(1);
+        if !is_right {
+            self.photons.clear();
+            for _ in 0..count {
+                let records = batch.saturating_mul(self.records_per_photon);
+                self.photons
+                    .push(PhotonBuffers::new(device, batch, records)?);
+            }
         }
         Ok(())
     }
+}
+
+/// Makes the textures of views that are new or have another size.
+fn fit_views(
+    views: &mut Vec<SplatTargets>,
+    format: SumFormat,
+    device: &wgpu::Device,
+    frame: &FrameParams<'_>,
+) -> Result<(), RendererError> {
+    views.truncate(frame.views.len());
+    for (index, view) in frame.views.iter().enumerate() {
+        let size = UVec2::from(view.size);
+        if views.get(index).is_none_or(|it| it.size != size) {
+            let targets = SplatTargets::new(device, size, format)?;
+            if let Some(place) = views.get_mut(index) {
+                *place = targets;
+            } else {
+                views.push(targets);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Makes room for the largest batch and the largest view, if there is less.
+fn fit_scratch(
+    scratch: &mut Option<SplatScratch>,
+    splat: &Splat,
+    device: &wgpu::Device,
+    frame: &FrameParams<'_>,
+    footprints: &[FootprintBatch<'_>],
+) -> Result<(), RendererError> {
+    let capacity = footprints.iter().map(FootprintBatch::capacity);
+    let capacity = capacity.max().unwrap_or(0).max(1);
+    let limits = device.limits();
+    let most = footprints_per_batch(&limits);
+    if capacity > most {
+        let record = size_of::<FootprintRecord>() as u64;
+        return Err(RendererError::Gpu(GpuError::BufferTooLarge {
+            what: "the footprints of a batch",
+            bytes: u64::from(capacity) * record,
+            limit: u64::from(most) * record,
+        }));
+    }
+    let mut tiles = 0;
+    for view in frame.views {
+        let size = UVec2::from(view.size);
+        tiles = tiles.max(levels(size, limits.max_texture_dimension_2d)?.1);
+    }
+    let fits = |it: &SplatScratch| it.capacity >= capacity && it.tiles >= tiles;
+    if !scratch.as_ref().is_some_and(fits) {
+        let pairs = SplatScratch::pairs(splat.options(), capacity);
+        // Before the new one is made, so that there is memory for it.
+        *scratch = None;
+        let layers = splat.format().layers;
+        *scratch = Some(SplatScratch::new(device, capacity, tiles, pairs, layers)?);
+    }
+    Ok(())
 }
 
 impl PreparedFrame {
@@ -280,6 +391,13 @@ impl PreparedFrame {
     /// If there is no such view.
     pub fn stats(&self, view: usize) -> Result<&wgpu::Buffer, RendererError> {
         Ok(&self.view(view)?.counts)
+    }
+
+    /// Where the photons of a traced frame landed: records for a gather, and counters for
+    /// [`TraceCounters`](crate::TraceCounters). None where the host gave footprints.
+    #[must_use]
+    pub fn photons(&self) -> &[PhotonBuffers] {
+        &self.photons
     }
 
     /// When each pass began and ended, where that was asked for and the device can tell.

@@ -246,11 +246,13 @@ const WORKGROUP_SIZE: u32 = 64u;
 
 @compute @workgroup_size(WORKGROUP_SIZE)
 fn trace_photons(
-    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32,
 ) {
-    if id.x < trace.count {
-        trace_photon(trace.first + id.x);
+    let index = (group.y * groups.x + group.x) * WORKGROUP_SIZE + invocation;
+    if index < trace.count {
+        trace_photon(trace.first + index);
     }
     workgroupBarrier();
     publish_ledger(invocation, WORKGROUP_SIZE);

@@ -9,8 +9,8 @@ use caustics_scene::{BvhOptions, Camera, SceneIntersector, Surface, World, gltf}
 use caustics_trace::{Photon, TraceOptions, trace_photons};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
-    CausticsRenderer, FootprintBatch, FootprintRecord, FrameParams, RendererOptions, SplatStats,
-    SurfaceInput, ViewParams, camera_matrix, wgpu,
+    CausticsRenderer, FootprintBatch, FootprintRecord, FrameLight, FrameParams, RendererOptions,
+    SplatStats, SurfaceInput, ViewParams, camera_matrix, wgpu,
 };
 
 pub(crate) type TestError = Box<dyn std::error::Error>;
@@ -362,7 +362,7 @@ pub(crate) fn irradiance(
         .collect();
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let frame = FrameParams {
-        footprints: &footprints,
+        light: FrameLight::Footprints(&footprints),
         views: &[picture.view(&textures)],
     };
     let prepared = renderer.prepare(device, queue, &mut encoder, &frame)?;

@@ -1,0 +1,92 @@
+use bytemuck::Pod;
+use caustics_scene::World;
+
+use crate::GpuError;
+use crate::body_order::BodyOrder;
+use crate::error_scope::filled_buffer;
+use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex};
+use crate::renderer_error::RendererError;
+use crate::scene_hierarchy::SceneHierarchy;
+
+/// A [`World`] where the shaders can trace it: vertices, triangles, objects with their materials,
+/// and a hierarchy of boxes over all of it.
+///
+/// Each kind is one buffer that is bound whole. Within WebGPU's default limits of 128 MiB a binding
+/// that is room for two million triangles; more is refused.
+#[derive(Clone, Debug)]
+pub struct SceneBuffers {
+    pub(crate) nodes: wgpu::Buffer,
+    pub(crate) vertices: wgpu::Buffer,
+    pub(crate) triangles: wgpu::Buffer,
+    pub(crate) bodies: wgpu::Buffer,
+    pub(crate) cumulative_areas: wgpu::Buffer,
+    pub(crate) root: u32,
+    bytes: u64,
+}
+
+impl SceneBuffers {
+    /// Builds the hierarchy and fills the buffers. They travel to the device with the next submission
+    /// that uses them.
+    ///
+    /// # Errors
+    /// [`GpuError::BufferTooLarge`] and [`GpuError::TooMany`], as [`RendererError::Gpu`];
+    /// [`RendererError::DeviceLost`] where the device gives no memory.
+    pub fn new(device: &wgpu::Device, world: &World) -> Result<Self, RendererError> {
+        let packed = PackedScene::new(world)?;
+        let hierarchy = SceneHierarchy::new(world, &BodyOrder::new(world)?);
+        let mut bytes = 0;
+        let nodes = upload::<Node>(device, "nodes", &hierarchy.nodes, &mut bytes)?;
+        let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
+        let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
+        let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
+        let areas = &packed.cumulative_areas;
+        let cumulative_areas = upload::<f32>(device, "cumulative areas", areas, &mut bytes)?;
+        Ok(Self {
+            nodes,
+            vertices,
+            triangles,
+            bodies,
+            cumulative_areas,
+            root: hierarchy.root(),
+            bytes,
+        })
+    }
+
+    /// Memory of the device that they occupy, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// A storage buffer of these elements, or of one that is never read where there are none.
+fn upload<T: Pod>(
+    device: &wgpu::Device,
+    what: &'static str,
+    elements: &[T],
+    total: &mut u64,
+) -> Result<wgpu::Buffer, RendererError> {
+    let bytes = size_of_val(elements).max(size_of::<T>()) as u64;
+    fits(device, what, bytes)?;
+    *total += bytes;
+    let nothing = [T::zeroed()];
+    let contents = if elements.is_empty() {
+        &nothing
+    } else {
+        elements
+    };
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    filled_buffer(device, what, usage, bytemuck::cast_slice(contents))
+}
+
+/// Refuses a storage buffer that the device cannot bind whole.
+pub(crate) fn fits(device: &wgpu::Device, what: &'static str, bytes: u64) -> Result<(), GpuError> {
+    let limits = device.limits();
+    let limit = limits
+        .max_storage_buffer_binding_size
+        .min(limits.max_buffer_size);
+    if bytes > limit {
+        return Err(GpuError::BufferTooLarge { what, bytes, limit });
+    }
+    Ok(())
+}
