@@ -19,9 +19,14 @@
 // all threads together, each for its pixel.
 const SMALL_AREA: u32 = 64u;
 
+// Parts of the brightest footprint in which all are counted: 2^21 of them fit.
+const BOUND_PARTS: f32 = 2047.0;
+
 var<workgroup> positions: array<vec3<f32>, 256>;
 var<workgroup> normals: array<vec3<f32>, 256>;
 var<workgroup> sums: array<atomic<u32>, 768>;
+var<workgroup> largest_bits: array<atomic<u32>, 3>;
+var<workgroup> part_sums: array<atomic<u32>, 3>;
 var<workgroup> large: array<u32, 256>;
 var<workgroup> large_count: atomic<u32>;
 var<workgroup> list: vec2<u32>;
@@ -58,44 +63,49 @@ fn splat_tiles(
         let room = arrayLength(&pairs);
         list = min(vec2<u32>(tile_starts[tile], tile_starts[tile + 1u]), vec2<u32>(room));
         atomicStore(&large_count, 0u);
+        for (var channel = 0u; channel < 3u; channel++) {
+            atomicStore(&largest_bits[channel], 0u);
+            atomicStore(&part_sums[channel], 0u);
+        }
     }
+    atomicStore(&sums[local], 0u);
+    atomicStore(&sums[local + 256u], 0u);
+    atomicStore(&sums[local + 512u], 0u);
     let range = workgroupUniformLoad(&list);
     let count = range.y - range.x;
 
     var result = vec3<f32>(0.0);
     if count > 0u {
-        // The bound of all sums, and with it the unit.
-        var bound = vec3<f32>(0.0);
+        // The brightest footprint of each channel, then their sum in parts of it, rounded up: whole
+        // numbers, so that the bound and the unit do not depend on the order either.
+        var largest = vec3<f32>(0.0);
         for (var i = range.x + local; i < range.y; i += 256u) {
-            bound += densities[pairs[i]].strength;
+            largest = max(largest, densities[pairs[i]].strength);
         }
-        atomicStore(&sums[local], bitcast<u32>(bound.x));
-        atomicStore(&sums[local + 256u], bitcast<u32>(bound.y));
-        atomicStore(&sums[local + 512u], bitcast<u32>(bound.z));
-        workgroupBarrier();
-        if local < 48u {
-            // A sixteenth of one channel.
-            var part = 0.0;
-            for (var i = 0u; i < 16u; i++) {
-                part += bitcast<f32>(atomicLoad(&sums[16u * local + i]));
-            }
-            atomicStore(&sums[16u * local], bitcast<u32>(part));
+        for (var channel = 0u; channel < 3u; channel++) {
+            // Numbers that are not negative are ordered as their bits are.
+            atomicMax(&largest_bits[channel], bitcast<u32>(largest[channel]));
         }
         workgroupBarrier();
-        bound = vec3<f32>(0.0);
-        for (var i = 0u; i < 256u; i += 16u) {
-            bound += bitcast<vec3<f32>>(vec3<u32>(
-                atomicLoad(&sums[i]),
-                atomicLoad(&sums[i + 256u]),
-                atomicLoad(&sums[i + 512u]),
-            ));
+        largest = bitcast<vec3<f32>>(vec3<u32>(
+            atomicLoad(&largest_bits[0]),
+            atomicLoad(&largest_bits[1]),
+            atomicLoad(&largest_bits[2]),
+        ));
+        let part = select(vec3<f32>(0.0), BOUND_PARTS / largest, largest > vec3<f32>(0.0));
+        var parts = vec3<u32>(0u);
+        for (var i = range.x + local; i < range.y; i += 256u) {
+            parts += vec3<u32>(ceil(part * densities[pairs[i]].strength));
+        }
+        for (var channel = 0u; channel < 3u; channel++) {
+            atomicAdd(&part_sums[channel], parts[channel]);
         }
         workgroupBarrier();
-        atomicStore(&sums[local], 0u);
-        atomicStore(&sums[local + 256u], 0u);
-        atomicStore(&sums[local + 512u], 0u);
-        workgroupBarrier();
-        bound *= kernel_peak();
+        let bound = kernel_peak() * largest / BOUND_PARTS * vec3<f32>(vec3<u32>(
+            atomicLoad(&part_sums[0]),
+            atomicLoad(&part_sums[1]),
+            atomicLoad(&part_sums[2]),
+        ));
         // A little less, for the rounding of this sum and of each part.
         let room = 4294000000.0 - 2.0 * f32(count);
         let unit = select(vec3<f32>(0.0), room / bound, bound > vec3<f32>(0.0));
