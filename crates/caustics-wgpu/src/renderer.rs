@@ -79,7 +79,7 @@ pub struct FrameParams<'a> {
 pub struct CausticsRenderer {
     splat: Splat,
     composite: CompositePass,
-    tracer: PhotonTracer,
+    tracer: Option<PhotonTracer>,
     records_per_photon: u32,
     photons: Vec<PhotonBuffers>,
     views: Vec<SplatTargets>,
@@ -153,7 +153,7 @@ impl CausticsRenderer {
             Ok(Self {
                 composite: CompositePass::new(device, &options.targets)?,
                 splat,
-                tracer: PhotonTracer::new(device),
+                tracer: None,
                 records_per_photon: options.records_per_photon,
                 photons: Vec::new(),
                 views: Vec::new(),
@@ -162,6 +162,18 @@ impl CausticsRenderer {
                 capabilities,
             })
         })
+    }
+
+    /// Compiles the shaders that trace photons, which else happens when the first frame with
+    /// [`FrameLight::Traced`] is prepared.
+    ///
+    /// # Errors
+    /// A device that is lost or out of memory.
+    pub fn compile_tracer(&mut self, device: &wgpu::Device) -> Result<(), RendererError> {
+        if self.tracer.is_none() {
+            self.tracer = Some(caught(device, || Ok(PhotonTracer::new(device)))?);
+        }
+        Ok(())
     }
 
     /// What was chosen by what the device can do.
@@ -195,6 +207,7 @@ impl CausticsRenderer {
         caught(device, || {
             if let FrameLight::Traced { plan, .. } = frame.light {
                 self.fit_photons(device, plan.photons())?;
+                self.tracer.get_or_insert_with(|| PhotonTracer::new(device));
             }
             let traced: Vec<_> = self.photons.iter().map(FootprintBatch::from).collect();
             let footprints = match frame.light {
@@ -208,13 +221,13 @@ impl CausticsRenderer {
             };
             let queries = self.timer.as_ref().map(|timer| &timer.queries);
             let mut recorder = Recorder::new(encoder, queries);
-            if let FrameLight::Traced { scene, plan } = frame.light {
+            if let (FrameLight::Traced { scene, plan }, Some(tracer)) = (frame.light, &self.tracer)
+            {
                 let mut first = 0;
                 for into in &self.photons {
                     into.clear(recorder.encoder);
                     let last = plan.photons().min(first + into.photons());
-                    self.tracer
-                        .record(device, &mut recorder, scene, plan, first..last, into)?;
+                    tracer.record(device, &mut recorder, scene, plan, first..last, into)?;
                     first = last;
                 }
             }

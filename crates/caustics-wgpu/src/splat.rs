@@ -213,14 +213,21 @@ impl Splat {
             targets.second_sum(device);
         }
         if let Way::Quads(quads) = &self.way
-            && batches.len() > 1
             && quads.is_scaled()
         {
-            // The scale is that of all batches together, so their peaks are summed first.
+            // The scale is that of all batches together, and so is the estimate.
+            let steps = &self.steps;
             for (number, batch) in batches.iter().enumerate() {
                 self.record_prepare(device, recorder, view, targets, scratch, batch);
-                let steps = &self.steps;
                 quads.record_scale(device, recorder, targets, scratch, steps, number == 0);
+            }
+            for (number, batch) in batches.iter().enumerate() {
+                let is_first = number == 0;
+                if batches.len() > 1 {
+                    self.record_prepare(device, recorder, view, targets, scratch, batch);
+                }
+                quads.record_order(device, recorder, targets, scratch, steps, batch, is_first);
+                quads.record_estimate(device, recorder, view, targets, scratch, is_first);
             }
             recorder.encoder.clear_buffer(&targets.counts, 0, None);
         }
@@ -237,12 +244,8 @@ impl Splat {
                 }
                 Way::Quads(quads) => {
                     let steps = &self.steps;
-                    if batches.len() == 1 || !quads.is_scaled() {
-                        quads.record_scale(device, recorder, targets, scratch, steps, is_first);
-                    }
-                    quads.record(
-                        device, recorder, view, targets, scratch, steps, batch, is_first,
-                    )?;
+                    quads.record_order(device, recorder, targets, scratch, steps, batch, is_first);
+                    quads.record(device, recorder, view, targets, scratch, is_first);
                 }
             }
         }

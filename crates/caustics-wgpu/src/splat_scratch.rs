@@ -68,7 +68,7 @@ impl SplatScratch {
             )?,
             draws: make(
                 "draws of quads",
-                16 * LEVELS as u64 * u64::from(layers),
+                16 * LEVELS as u64 * u64::from(layers + 1),
                 wgpu::BufferUsages::INDIRECT,
             )?,
         })

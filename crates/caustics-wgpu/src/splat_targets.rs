@@ -17,6 +17,8 @@ pub(crate) struct SplatTargets {
     /// What is summed at each level alone, before and after a batch: one of two, or one that is
     /// blended into.
     pub(crate) sums: Vec<SumTarget>,
+    /// An estimate of the sums, where they are blended in half floats.
+    pub(crate) estimate: Option<SumTarget>,
     /// For each level: its own and all coarser ones.
     pub(crate) totals: Vec<wgpu::TextureView>,
     pub(crate) irradiance: wgpu::Texture,
@@ -127,6 +129,10 @@ impl SplatTargets {
             texels: single(&texels),
             objects: single(&objects),
             sums: vec![SumTarget::of(&sum)],
+            estimate: (format.format == wgpu::TextureFormat::Rgba16Float).then(|| {
+                let label = "caustics estimate";
+                SumTarget::of(&make(label, padded, mips, 1, format.format, usage))
+            }),
             totals,
             irradiance,
             counts: storage_buffer(

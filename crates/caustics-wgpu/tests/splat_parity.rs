@@ -114,10 +114,11 @@ fn batches_add_up() -> Result<(), TestError> {
         method: SplatMethod::Quads,
         ..SplatOptions::default()
     };
-    for (features, splat) in [
-        (wgpu::Features::empty(), SplatOptions::default()),
-        (wgpu::Features::empty(), quads),
-        (wgpu::Features::FLOAT32_BLENDABLE, quads),
+    for (features, splat, tolerance) in [
+        (wgpu::Features::empty(), SplatOptions::default(), 1e-5),
+        // Two pictures that are dithered differently, each within a hundredth.
+        (wgpu::Features::empty(), quads, 2e-2),
+        (wgpu::Features::FLOAT32_BLENDABLE, quads, 1e-5),
     ] {
         let Some((device, queue)) = device_with(features) else {
             return Ok(());
@@ -132,7 +133,7 @@ fn batches_add_up() -> Result<(), TestError> {
             .zip(&sum)
             .map(|(a, b)| (a[0] - b[0]).abs())
             .sum();
-        assert!(total > 0.0 && off < 1e-3 * total, "{off} of {total}");
+        assert!(total > 0.0 && off < tolerance * total, "{off} of {total}");
     }
     Ok(())
 }

@@ -28,10 +28,16 @@ fn splat_order(@builtin(global_invocation_id) id: vec3<u32>) {
     order[first + atomicAdd(&counts.level_cursor[place.level], 1u)] = id.x;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(128)
 fn splat_draws(@builtin(local_invocation_index) local: u32) {
     if local >= LEVELS * step.layers {
         return;
+    }
+    if local < LEVELS {
+        // The sample that the estimate is made from.
+        let all = atomicLoad(&counts.by_level[local]);
+        let sampled = (all + sample_stride(all) - 1u) / sample_stride(all);
+        draws[LEVELS * step.layers + local] = vec4<u32>(4u, sampled, 0u, 0u);
     }
     let count = atomicLoad(&counts.by_level[local / step.layers]);
     let each = (count + step.layers - 1u) / step.layers;

@@ -9,6 +9,14 @@ struct SplatDraw {
     pad: u32,
 }
 
+// 0: sums of 32 bits. 1: half floats, each footprint by its share as the estimate says. 2: the
+// estimate, from a sample of the footprints.
+override QUADS_ROUNDING: u32 = 0u;
+
+// A part of a pixel's sum, in bits, of which everything added is a multiple: one bit less than half
+// floats have, since the estimate may be too low.
+const ROUNDED_BITS: f32 = 10.0;
+
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<uniform> quads: SplatDraw;
 @group(0) @binding(2) var<storage, read> densities: array<StoredDensity>;
@@ -17,6 +25,7 @@ struct SplatDraw {
 @group(0) @binding(5) var<storage, read> level_counts: array<u32>;
 @group(0) @binding(6) var texels: texture_2d<u32>;
 @group(0) @binding(7) var<storage, read> splat_scale: SplatScale;
+@group(0) @binding(8) var estimate: texture_2d<f32>;
 
 // Where `by_level` starts in `SplatCounts`, in words.
 const BY_LEVEL: u32 = 8u;
@@ -26,6 +35,14 @@ struct Corner {
     @location(0) @interpolate(flat, either) index: u32,
 }
 
+// All footprints of the level are drawn, or a sample for the estimate.
+fn drawn_stride() -> u32 {
+    if QUADS_ROUNDING == 2u {
+        return sample_stride(level_counts[BY_LEVEL + quads.level]);
+    }
+    return 1u;
+}
+
 @vertex
 fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
     let count = level_counts[BY_LEVEL + quads.level];
@@ -33,7 +50,7 @@ fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     for (var level = 0u; level < quads.level; level++) {
         first += level_counts[BY_LEVEL + level];
     }
-    let index = order[first + instance];
+    let index = order[first + drawn_stride() * instance];
     let place = places[index];
     let size = vec2<f32>(view.levels[quads.level].xy);
     let side = vec2<f32>(vec2<u32>(vertex & 1u, vertex >> 1u));
@@ -58,6 +75,20 @@ fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     return Corner(vec4<f32>(ndc, 0.5, 1.0), index);
 }
 
+// A footprint's share of a pixel as a multiple of a unit, of which the pixel's sum has at most 2^11:
+// then no addition rounds, on whatever hardware. It is rounded up or down so that the mean is
+// right, by a sequence that spreads evenly over the footprints of a pixel.
+fn rounded(share: vec3<f32>, pixel: vec2<u32>, index: u32) -> vec3<f32> {
+    let whole = textureLoad(estimate, vec2<i32>(pixel), 0).xyz / f32(quads.layers);
+    // No less than a half float's own last bits.
+    let exponent = ceil(log2(max(max(whole, share), vec3<f32>(1e-6)))) - ROUNDED_BITS;
+    let unit = exp2(max(exponent, vec3<f32>(-24.0)));
+    let start = (pixel.x * 0x9e3779b9u) ^ (pixel.y * 0x85ebca6bu);
+    // The golden ratio's fractional part in 32 bits.
+    let place = f32((start + index * 0x9e3779b9u) >> 8u) / 16777216.0;
+    return unit * floor(share / unit + place);
+}
+
 @fragment
 fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
     let texel = textureLoad(texels, vec2<i32>(corner.position.xy), 0);
@@ -72,5 +103,12 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
         bitcast<vec3<f32>>(texel.xyz),
         decode_octahedral(texel.w),
     );
-    return vec4<f32>(splat_scale.scale * weight * stored.strength, 0.0);
+    let share = splat_scale.scale * weight * stored.strength;
+    if QUADS_ROUNDING == 0u {
+        return vec4<f32>(share, 0.0);
+    }
+    if QUADS_ROUNDING == 2u {
+        return vec4<f32>(f32(drawn_stride()) * share, 0.0);
+    }
+    return vec4<f32>(rounded(share, vec2<u32>(corner.position.xy), corner.index), 0.0);
 }
