@@ -257,9 +257,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             kept *= survival;
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
+        // By roots, which round alike on every machine, as powers do not.
+        let root = kept.sqrt();
         let differential = self
             .scattered(branch, point, outgoing)
-            .scaled(kept.powf(-1.0 / N as f32));
+            .scaled(1.0 / if N > 2 { root.sqrt() } else { root });
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let origin = point

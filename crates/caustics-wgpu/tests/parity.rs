@@ -100,6 +100,8 @@ fn explore() {
                 pos.push(Vec3::from(r.position).distance(photon.position) / size);
                 flux.push((r.flux() - photon.flux).abs().max_element() / photon.flux.max_element());
                 let scale = photon.axes[0].length().max(photon.axes[1].length());
+                let err = (Vec3::from(r.axis_u) - photon.axes[0]).length().max((Vec3::from(r.axis_v) - photon.axes[1]).length()) / scale;
+                if err > 1e-3 { println!("  {number}: {err} {r:?} {photon:?}"); }
                 axes.push((Vec3::from(r.axis_u) - photon.axes[0]).length().max((Vec3::from(r.axis_v) - photon.axes[1]).length()) / scale);
             }
         }

@@ -1,5 +1,4 @@
-// The watertight triangle test of Woop, Benthin and Wald 2013. Twin: watertight.rs in
-// caustics-geometry.
+// The watertight triangle test of Woop, Benthin and Wald 2013. Twin: leaf_test.rs in caustics-accel.
 //
 // A product that is rounded by itself keeps the guarantee that a ray through a shared edge hits one
 // of its triangles; see rounding.wgsl. Where all edge functions vanish the twin computes in f64.
@@ -25,12 +24,8 @@ fn to_z(p: vec3<f32>, axis: u32) -> vec3<f32> {
 
 fn sheared_ray(ray: Ray) -> ShearedRay {
     let size = abs(ray.direction);
-    var axis = 2u;
-    if size.x > size.y && size.x > size.z {
-        axis = 0u;
-    } else if size.y > size.z {
-        axis = 1u;
-    }
+    var axis = select(0u, 1u, size.y > size.x);
+    axis = select(axis, 2u, size.z > max(size.x, size.y));
     let direction = to_z(ray.direction, axis);
     let shear = vec3(direction.x / direction.z, direction.y / direction.z, 1.0 / direction.z);
     return ShearedRay(ray.origin, shear, axis);
@@ -81,9 +76,6 @@ fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c
             return missed;
         }
     }
-    let inverse = 1.0 / sum;
-    let u = weights.y * inverse;
-    let v = weights.z * inverse;
-    let along = weights.x * inverse * depth.x + u * depth.y + v * depth.z;
-    return vec3(along * ray.shear.z, u, v);
+    let along = weights.x * depth.x + weights.y * depth.y + weights.z * depth.z;
+    return vec3(along * ray.shear.z / sum, weights.y / sum, weights.z / sum);
 }
