@@ -1,6 +1,8 @@
 //! What the tests of this crate share.
 #![allow(dead_code, reason = "each test file takes what it needs")]
 
+pub mod tracing;
+
 use caustics_wgpu::wgpu;
 
 /// A device of an adapter of this machine, with no more than WebGPU's default limits.
