@@ -14,7 +14,7 @@ use crate::trace_plan::{PlannedEmitter, TracePlan};
 /// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
 const WORKGROUP_SIZE: u32 = 64;
 
-const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 26] {
+const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 27] {
     [
         parameters,
         FOOTPRINT_RECORD,
@@ -22,6 +22,7 @@ const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 26] {
         shader_piece!("scene"),
         shader_piece!("rounding"),
         shader_piece!("vector"),
+        shader_piece!("double_float"),
         shader_piece!("random"),
         shader_piece!("wide_integer"),
         shader_piece!("sobol"),

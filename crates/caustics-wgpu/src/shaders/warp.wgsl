@@ -98,8 +98,8 @@ fn square_to_sphere_octahedral(uv: vec2<f32>) -> DirectionSample {
     let d_radius = up * (2.0 - 2.0 * r * r) / stretch;
     let turn = select(parts, parts.yx, above);
     let d_z = -2.0 * r;
-    let across_u = side * (d_radius * radial - stretch * HALF_PI * turn.x * tangential);
-    let across_v = side * (d_radius * radial + stretch * HALF_PI * turn.y * tangential);
+    let across_u = side * (d_radius * radial + stretch * (-HALF_PI * turn.x) * tangential);
+    let across_v = side * (d_radius * radial + stretch * (HALF_PI * turn.y) * tangential);
     return DirectionSample(
         vec3(side * radius * radial, up * (1.0 - r * r)),
         2.0 * side.x * vec3(across_u, d_z),

@@ -1,9 +1,8 @@
 // The watertight triangle test of Woop, Benthin and Wald 2013. Twin: leaf_test.rs in caustics-accel.
 //
 // A product that is rounded by itself keeps the guarantee that a ray through a shared edge hits one
-// of its triangles; see rounding.wgsl. Where all edge functions vanish the twin computes in f64.
-// Here they are computed again in coordinates scaled to 1, which is enough where the triangle was
-// too small for f32; one seen edge-on is left to its neighbours.
+// of its triangles; see rounding.wgsl. Where all edge functions vanish, they are computed again, in
+// 48 bits and in coordinates scaled to 1, as the twin does in f64.
 
 struct ShearedRay {
     origin: vec3<f32>,
@@ -40,6 +39,10 @@ fn edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
     return rounded(p.x * q.y) - rounded(p.y * q.x);
 }
 
+fn exact_edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
+    return double_sum(exact_product(p.x, q.y), double_negated(exact_product(p.y, q.x))).high;
+}
+
 // Where the ray meets the triangle, with `t` not above 0 where it does not.
 fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c_world: vec3<f32>) -> vec3<f32> {
     let missed = vec3(-1.0);
@@ -65,10 +68,13 @@ fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c
             return missed;
         }
         let scale = 1.0 / size;
+        a = vec3(scale * a.xy, a.z);
+        b = vec3(scale * b.xy, b.z);
+        c = vec3(scale * c.xy, c.z);
         weights = vec3(
-            edge_function(scale * c.xy, scale * b.xy),
-            edge_function(scale * a.xy, scale * c.xy),
-            edge_function(scale * b.xy, scale * a.xy),
+            exact_edge_function(c.xy, b.xy),
+            exact_edge_function(a.xy, c.xy),
+            exact_edge_function(b.xy, a.xy),
         );
         sum = weights.x + weights.y + weights.z;
         let crosses = any(weights < vec3(0.0)) && any(weights > vec3(0.0));

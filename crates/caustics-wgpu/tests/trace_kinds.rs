@@ -1,0 +1,271 @@
+//! Lights, materials, sequences and ways of branching that the ten scenes do not have.
+
+mod common;
+
+use caustics_geometry::TriangleMesh;
+use caustics_geometry::shapes::{cuboid, icosphere, quad, torus};
+use caustics_sampling::Sequence;
+use caustics_scene::{Instance, Light, Material, Scene, Shape, World};
+use caustics_trace::{Aim, Branching, Fate, TraceOptions};
+use caustics_wgpu::glam::{Affine3A, Vec3};
+use caustics_wgpu::{PhotonTracer, wgpu};
+
+use common::tracing::{Difference, Stage, ledger_of, trace_on_gpu, trails_by_cpu, unlike_lines};
+
+type Gpu = (wgpu::Device, wgpu::Queue);
+
+const PHOTONS: u32 = 8_000;
+
+fn options() -> TraceOptions {
+    TraceOptions {
+        photons: PHOTONS,
+        ..TraceOptions::default()
+    }
+}
+
+fn add(scene: &mut Scene, shape: Shape, at: Vec3, material: Material) {
+    let material = scene.add_material(material).unwrap();
+    let instance = Instance {
+        transform: Affine3A::from_translation(at),
+        ..Instance::new("", shape, material)
+    };
+    scene.add_instance(instance).unwrap();
+}
+
+fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, at: Vec3, material: Material) {
+    let shape = Shape::Mesh(scene.add_mesh(mesh));
+    add(scene, shape, at, material);
+}
+
+fn ball(radius: f32) -> Shape {
+    let center = Vec3::ZERO;
+    Shape::Sphere { center, radius }
+}
+
+/// A floor of 8 metres, and nothing that shines.
+fn floor() -> Scene {
+    let mut scene = Scene::new();
+    let mesh = quad([-4.0, 0.0, 4.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0]).unwrap();
+    add_mesh(
+        &mut scene,
+        mesh,
+        Vec3::ZERO,
+        Material::diffuse("white", [0.8; 3]),
+    );
+    scene
+}
+
+/// A floor with a faceted ball of glass.
+fn glass() -> Scene {
+    let mut scene = floor();
+    let glass = Material::dielectric("glass", 1.5);
+    add_mesh(&mut scene, icosphere(0.7, 3).unwrap(), Vec3::Y, glass);
+    scene
+}
+
+fn lit(mut scene: Scene, light: Light) -> Stage {
+    scene.add_light(light).unwrap();
+    Stage::new(World::new(&scene).unwrap())
+}
+
+fn lamp() -> Light {
+    Light::point([0.4, 3.0, 0.2], [5.0, 4.0, 3.0]).unwrap()
+}
+
+/// Traces on both sides, and holds the GPU to its promise.
+fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &TraceOptions) {
+    let plan = stage.plan(options);
+    let traced = trace_on_gpu(gpu, tracer, stage, &plan, 8 * PHOTONS);
+    let trails = trails_by_cpu(stage, options);
+    let difference = Difference::between(&stage.world, &trails, &traced);
+    let ledger = ledger_of(&trails, &plan);
+    println!("{name}: {:?} {:?}", difference.equal_records, difference);
+    let mut beyond = difference.beyond_promise(trails.len());
+    beyond.extend(unlike_lines(&traced.counters.ledger, &ledger, trails.len()));
+    assert_eq!(beyond, Vec::<String>::new(), "{name}");
+    assert!(difference.equal_records.1 > 100, "{name}");
+}
+
+fn with_tracer(test: impl Fn(&Gpu, &PhotonTracer)) {
+    if let Some(gpu) = common::test_device() {
+        let tracer = PhotonTracer::new(&gpu.0);
+        test(&gpu, &tracer);
+    }
+}
+
+#[test]
+fn every_sequence_and_seed() {
+    with_tracer(|gpu, tracer| {
+        let stage = lit(glass(), lamp());
+        for sequence in Sequence::ALL {
+            for seed in [0, 0x1234_5678_9abc_def0] {
+                let options = TraceOptions {
+                    sequence,
+                    seed,
+                    ..options()
+                };
+                hold(gpu, tracer, &format!("{sequence} {seed}"), &stage, &options);
+            }
+        }
+    });
+}
+
+#[test]
+fn every_way_of_branching() {
+    with_tracer(|gpu, tracer| {
+        let stage = lit(glass(), lamp());
+        for branching in [
+            Branching::Roulette,
+            Branching::SplitFirst,
+            Branching::SplitAll,
+        ] {
+            for (min_weight, max_depth) in [(0.0, 6), (0.03, 128), (1.0, 128)] {
+                let options = TraceOptions {
+                    branching,
+                    min_weight,
+                    max_depth,
+                    ..options()
+                };
+                let name = format!("{branching:?} {min_weight} {max_depth}");
+                hold(gpu, tracer, &name, &stage, &options);
+            }
+        }
+    });
+}
+
+#[test]
+fn every_light() {
+    with_tracer(|gpu, tracer| {
+        let spot = Light::spot([1.0, 3.0, 0.0], [-0.3, -1.0, 0.0], [9.0; 3], 0.1, 0.4).unwrap();
+        let wide = Light::spot([0.0, 1.0, 2.0], [0.0, 0.0, -1.0], [9.0; 3], 0.2, 1.5).unwrap();
+        let sun = Light::directional([-0.3, -1.0, -0.1], [100.0, 90.0, 70.0]).unwrap();
+        for (name, light) in [
+            ("spot", spot),
+            ("wide", wide),
+            ("sun", sun),
+            ("lamp", lamp()),
+        ] {
+            let stage = lit(glass(), light);
+            for aim in [Aim::Casters, Aim::Everywhere] {
+                let options = TraceOptions { aim, ..options() };
+                hold(gpu, tracer, &format!("{name} {aim:?}"), &stage, &options);
+            }
+        }
+    });
+}
+
+#[test]
+fn surfaces_that_shine() {
+    with_tracer(|gpu, tracer| {
+        let shining = |double_sided| Material {
+            emission: Vec3::new(3.0, 2.0, 1.0),
+            double_sided,
+            ..Material::diffuse("shining", [0.5; 3])
+        };
+        let mut scene = glass();
+        let panel = quad([-0.5, 3.0, -0.5], [1.0, 0.0, 0.0], [0.0, 0.3, 1.0]).unwrap();
+        add_mesh(&mut scene, panel, Vec3::ZERO, shining(true));
+        let lumpy = icosphere(0.2, 1).unwrap();
+        add_mesh(&mut scene, lumpy, Vec3::new(1.5, 2.0, 0.0), shining(false));
+        add(
+            &mut scene,
+            ball(0.15),
+            Vec3::new(-1.5, 1.5, 0.0),
+            shining(false),
+        );
+        scene.add_light(lamp()).unwrap();
+        let stage = Stage::new(World::new(&scene).unwrap());
+        for aim in [Aim::Casters, Aim::Everywhere] {
+            let options = TraceOptions { aim, ..options() };
+            hold(gpu, tracer, &format!("shining {aim:?}"), &stage, &options);
+        }
+    });
+}
+
+#[test]
+fn every_material() {
+    with_tracer(|gpu, tracer| {
+        let prism = cuboid([1.0, 1.0, 1.0]).unwrap();
+        let mut dispersing = floor();
+        let flint = Material::dielectric("flint", 1.7).with_dispersion(0.6);
+        let tinted = Material::dielectric("tinted", 1.4)
+            .with_attenuation(Vec3::new(0.2, 1.0, 3.0))
+            .with_dispersion(0.2);
+        add_mesh(
+            &mut dispersing,
+            prism.clone(),
+            Vec3::new(0.2, 0.8, 0.1),
+            flint,
+        );
+        add_mesh(&mut dispersing, prism, Vec3::new(1.5, 0.8, 0.1), tinted);
+        hold(
+            gpu,
+            tracer,
+            "dispersion",
+            &lit(dispersing, lamp()),
+            &options(),
+        );
+
+        let mut gold = floor();
+        let metal = Material::metal("gold", [1.0, 0.76, 0.33]);
+        add_mesh(
+            &mut gold,
+            torus(0.8, 0.2, 64, 32).unwrap(),
+            0.4 * Vec3::Y,
+            metal,
+        );
+        hold(gpu, tracer, "metal", &lit(gold, lamp()), &options());
+    });
+}
+
+#[test]
+fn bodies_that_nest_and_overlap() {
+    with_tracer(|gpu, tracer| {
+        let mut scene = floor();
+        let body = |ior, priority| Material::dielectric("", ior).with_priority(priority);
+        let sizes = [
+            (1.0, 1.3, 0),
+            (0.8, 1.5, 2),
+            (0.85, 1.36, -1),
+            (0.3, 1.0, 3),
+        ];
+        for (edge, ior, priority) in sizes {
+            let mesh = cuboid([edge, 0.9 * edge, 1.1 * edge]).unwrap();
+            add_mesh(
+                &mut scene,
+                mesh,
+                Vec3::new(0.05 * edge, 0.7, 0.0),
+                body(ior, priority),
+            );
+        }
+        // The lamp is inside the outermost body and the one in it.
+        let inside = Light::point([0.05, 0.75, 0.32], [2.0; 3]).unwrap();
+        for (name, light) in [("from outside", lamp()), ("from inside", inside)] {
+            let mut scene = scene.clone();
+            scene.add_light(light).unwrap();
+            let stage = Stage::new(World::new(&scene).unwrap());
+            hold(gpu, tracer, name, &stage, &options());
+        }
+    });
+}
+
+#[test]
+fn exact_spheres() {
+    with_tracer(|gpu, tracer| {
+        let mut scene = floor();
+        let glass = Material::dielectric("glass", 1.5);
+        add(&mut scene, ball(0.6), Vec3::new(0.0, 1.0, 0.0), glass);
+        let mirror = Material::metal("mirror", [0.9; 3]);
+        add(&mut scene, ball(0.4), Vec3::new(1.3, 0.6, 0.3), mirror);
+        let water = Material::dielectric("water", 1.33).with_attenuation([0.5, 0.2, 0.1]);
+        add(&mut scene, ball(0.5), Vec3::new(-1.2, 0.8, 0.2), water);
+        let air = Material::dielectric("bubble", 1.0).with_priority(1);
+        add(&mut scene, ball(0.2), Vec3::new(-1.15, 0.85, 0.2), air);
+        let stage = lit(scene, lamp());
+        hold(gpu, tracer, "spheres", &stage, &options());
+        // No photon may meet the sphere that it has just left: it would be lost in it.
+        let plan = stage.plan(&options());
+        let traced = trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS);
+        assert_eq!(traced.counters.ledger.entry(Fate::TooDeep).count, 0);
+    });
+}
