@@ -10,7 +10,9 @@ use caustics_trace::{Aim, Branching, Fate, TraceOptions};
 use caustics_wgpu::glam::{Affine3A, Vec3};
 use caustics_wgpu::{PhotonTracer, wgpu};
 
-use common::tracing::{Difference, Stage, ledger_of, trace_on_gpu, trails_by_cpu, unlike_lines};
+use common::tracing::{
+    Difference, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
+};
 
 type Gpu = (wgpu::Device, wgpu::Queue);
 
@@ -87,9 +89,8 @@ fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &T
 }
 
 fn with_tracer(test: impl Fn(&Gpu, &PhotonTracer)) {
-    if let Some(gpu) = common::test_device() {
-        let tracer = PhotonTracer::new(&gpu.0);
-        test(&gpu, &tracer);
+    if let Some((gpu, tracer)) = shared_tracer() {
+        test(gpu, tracer);
     }
 }
 

@@ -3,20 +3,18 @@
 mod common;
 
 use caustics_trace::TraceOptions;
-use caustics_wgpu::PhotonTracer;
 
 use common::tracing::{
-    Difference, SCENES, Stage, ledger_of, trace_on_gpu, trails_by_cpu, unlike_lines,
+    Difference, SCENES, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
 };
 
 const PHOTONS: u32 = 100_000;
 
 #[test]
 fn the_same_photons_land_in_the_same_places() {
-    let Some(device) = common::test_device() else {
+    let Some((gpu, tracer)) = shared_tracer() else {
         return;
     };
-    let tracer = PhotonTracer::new(&device.0);
     let options = TraceOptions {
         photons: PHOTONS,
         ..TraceOptions::default()
@@ -25,7 +23,7 @@ fn the_same_photons_land_in_the_same_places() {
     for name in SCENES {
         let stage = Stage::load(name);
         let plan = stage.plan(&options);
-        let traced = trace_on_gpu(&device, &tracer, &stage, &plan, 4 * PHOTONS);
+        let traced = trace_on_gpu(gpu, tracer, &stage, &plan, 4 * PHOTONS);
         let trails = trails_by_cpu(&stage, &options);
         let difference = Difference::between(&stage.world, &trails, &traced);
         println!(
@@ -56,17 +54,16 @@ fn the_same_photons_land_in_the_same_places() {
 
 #[test]
 fn other_photons_are_told_apart() {
-    let Some(device) = common::test_device() else {
+    let Some((gpu, tracer)) = shared_tracer() else {
         return;
     };
-    let tracer = PhotonTracer::new(&device.0);
     let stage = Stage::load("p03_cognac.glb");
     let options = TraceOptions {
         photons: 2_000,
         ..TraceOptions::default()
     };
     let plan = stage.plan(&options);
-    let traced = trace_on_gpu(&device, &tracer, &stage, &plan, 10_000);
+    let traced = trace_on_gpu(gpu, tracer, &stage, &plan, 10_000);
     // The points of the lattice lie elsewhere in their cells.
     let other = TraceOptions { seed: 1, ..options };
     let trails = trails_by_cpu(&stage, &other);

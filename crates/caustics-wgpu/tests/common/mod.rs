@@ -3,6 +3,8 @@
 
 pub mod tracing;
 
+use std::sync::OnceLock;
+
 use caustics_wgpu::wgpu;
 
 /// A device of an adapter of this machine, with no more than WebGPU's default limits.
@@ -19,6 +21,16 @@ pub fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
         println!("skipped: no GPU adapter: {error}");
     }
     device.ok()
+}
+
+/// The device that the tests of one file share, as [`test_device`] gives it: the shaders of the
+/// software adapter take seconds to compile.
+///
+/// # Panics
+/// Without an adapter where `CI` is set.
+pub fn shared_device() -> Option<&'static (wgpu::Device, wgpu::Queue)> {
+    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+    DEVICE.get_or_init(test_device).as_ref()
 }
 
 async fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn std::error::Error>> {

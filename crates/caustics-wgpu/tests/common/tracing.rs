@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use caustics_sampling::PointSet;
 use caustics_scene::gltf::load_path;
@@ -15,7 +16,7 @@ use caustics_wgpu::{
     FootprintRecord, PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, TracePlan, wgpu,
 };
 
-use super::words;
+use super::{shared_device, words};
 
 /// The names of the ten scenes, with the ending.
 pub const SCENES: [&str; 10] = [
@@ -80,6 +81,13 @@ pub fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> 
         }
     }
     trails
+}
+
+/// The shared device, and the tracer that its tests share.
+pub fn shared_tracer() -> Option<(&'static (wgpu::Device, wgpu::Queue), &'static PhotonTracer)> {
+    static TRACER: OnceLock<PhotonTracer> = OnceLock::new();
+    let gpu = shared_device()?;
+    Some((gpu, TRACER.get_or_init(|| PhotonTracer::new(&gpu.0))))
 }
 
 /// What one photon stored, in order: a hash of the path, and the record.
