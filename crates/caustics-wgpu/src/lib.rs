@@ -31,15 +31,21 @@
 //! | know what went wrong | [`GpuError`] |
 
 mod body_order;
+mod camera_matrix;
+mod capabilities;
+mod composite;
 mod error;
 mod error_scope;
 mod footprint_record;
+mod gather;
 mod gpu_scene;
 mod pass_layout;
+mod pass_times;
 mod photon_buffers;
 mod photon_tracer;
 mod prefix_sum;
 mod recorder;
+mod renderer;
 mod renderer_error;
 mod scene_buffers;
 mod scene_hierarchy;
@@ -55,13 +61,20 @@ mod splat_view;
 mod trace_counters;
 mod trace_params;
 mod trace_plan;
+mod view_params;
 
+pub use camera_matrix::camera_matrix;
+pub use capabilities::Capabilities;
+pub use composite::CompositeTarget;
 pub use error::GpuError;
 pub use footprint_record::FootprintRecord;
+pub use gather::{Gather, GatherCounts, GatherOptions, GatherPoint};
 pub use glam;
+pub use pass_times::{FrameTimestamps, PassTime};
 pub use photon_buffers::PhotonBuffers;
 pub use photon_tracer::PhotonTracer;
 pub use recorder::RecordedWork;
+pub use renderer::{CausticsRenderer, FrameLight, FrameParams, PreparedFrame, RendererOptions};
 pub use renderer_error::{MissingLimit, RendererError};
 pub use scene_buffers::SceneBuffers;
 pub use splat_options::{SplatKernel, SplatMethod, SplatOptions};
@@ -69,4 +82,5 @@ pub use splat_scratch::FootprintBatch;
 pub use splat_stats::SplatStats;
 pub use trace_counters::TraceCounters;
 pub use trace_plan::TracePlan;
+pub use view_params::{NormalEncoding, SurfaceInput, ViewParams};
 pub use wgpu;

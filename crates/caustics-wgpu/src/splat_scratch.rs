@@ -2,7 +2,7 @@ use crate::error_scope::storage_buffer;
 use crate::renderer_error::RendererError;
 use crate::splat_options::SplatOptions;
 use crate::splat_view::LEVELS;
-use crate::{FootprintRecord, GpuError};
+use crate::{FootprintRecord, GpuError, PhotonBuffers};
 
 /// Bytes of a `StoredDensity` of `shaders/density.wgsl`.
 pub(crate) const DENSITY_BYTES: u64 = 64;
@@ -83,22 +83,6 @@ impl SplatScratch {
             crate::SplatMethod::Quads => u64::from(capacity),
         }
     }
-
-    /// Bytes that it occupies.
-    pub(crate) fn bytes(&self) -> u64 {
-        [
-            &self.densities,
-            &self.places,
-            &self.tile_counts,
-            &self.tile_starts,
-            &self.pairs,
-            &self.peak_sums,
-            &self.draws,
-        ]
-        .map(wgpu::Buffer::size)
-        .iter()
-        .sum()
-    }
 }
 
 /// Footprints in buffers of the GPU: [`FootprintRecord`]s, and a buffer whose first word is their
@@ -109,6 +93,16 @@ pub struct FootprintBatch<'a> {
     pub records: &'a wgpu::Buffer,
     /// Their number; its usage includes `STORAGE`.
     pub count: &'a wgpu::Buffer,
+}
+
+impl<'a> From<&'a PhotonBuffers> for FootprintBatch<'a> {
+    /// The landings of traced photons.
+    fn from(photons: &'a PhotonBuffers) -> Self {
+        Self {
+            records: photons.records(),
+            count: photons.counters(),
+        }
+    }
 }
 
 impl FootprintBatch<'_> {

@@ -51,7 +51,7 @@ impl SplatTiles {
         let bin = [
             Slot::Uniform,
             Slot::Read,
-            Slot::Write,
+            Slot::Read,
             Slot::Write,
             Slot::Write,
             Slot::Write,
