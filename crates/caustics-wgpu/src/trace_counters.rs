@@ -20,15 +20,15 @@ impl TraceCounters {
     /// Words of the buffer of counters. Mirrors `COUNTERS` in `shaders/ledger.wgsl`.
     pub const WORDS: usize = 92;
 
-    const STORED: usize = 0;
-    const LINES: usize = 2;
-    const RAYS: usize = 14;
-    const FALLBACKS: usize = 15;
-    const BOUNDED: usize = 16;
-    const SUMS: usize = 20;
+    pub(crate) const STORED: usize = 0;
+    pub(crate) const LINES: usize = 2;
+    pub(crate) const RAYS: usize = 14;
+    pub(crate) const FALLBACKS: usize = 15;
+    pub(crate) const BOUNDED: usize = 16;
+    pub(crate) const SUMS: usize = 20;
 
     /// The fates in the order of the shader's lines, which further ones follow.
-    const FATES: [Fate; 9] = [
+    pub(crate) const FATES: [Fate; 9] = [
         Fate::Stored,
         Fate::Absorbed,
         Fate::Escaped,
@@ -39,9 +39,9 @@ impl TraceCounters {
         Fate::Roulette,
         Fate::Invalid,
     ];
-    const CROWDED: usize = 9;
-    const EMITTED: usize = 10;
-    const ROULETTE_GAIN: usize = 11;
+    pub(crate) const CROWDED: usize = 9;
+    pub(crate) const EMITTED: usize = 10;
+    pub(crate) const ROULETTE_GAIN: usize = 11;
 
     /// Reads the words of [`PhotonBuffers::counters`](crate::PhotonBuffers::counters) after photons
     /// of `plan` were traced: all of them, or the light that its other photons carry counts as
