@@ -2,14 +2,14 @@
 
 mod common;
 
-use caustics_geometry::TriangleMesh;
 use caustics_geometry::shapes::{cuboid, icosphere, quad, torus};
 use caustics_sampling::Sequence;
-use caustics_scene::{Instance, Light, Material, Scene, Shape, World};
+use caustics_scene::{Light, Material, World};
 use caustics_trace::{Aim, Branching, Fate, TraceOptions};
-use caustics_wgpu::glam::{Affine3A, Vec3};
+use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{PhotonTracer, wgpu};
 
+use common::scenes::{add, add_mesh, ball, floor, glass, lamp, lit};
 use common::tracing::{
     Difference, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
 };
@@ -23,55 +23,6 @@ fn options() -> TraceOptions {
         photons: PHOTONS,
         ..TraceOptions::default()
     }
-}
-
-fn add(scene: &mut Scene, shape: Shape, at: Vec3, material: Material) {
-    let material = scene.add_material(material).unwrap();
-    let instance = Instance {
-        transform: Affine3A::from_translation(at),
-        ..Instance::new("", shape, material)
-    };
-    scene.add_instance(instance).unwrap();
-}
-
-fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, at: Vec3, material: Material) {
-    let shape = Shape::Mesh(scene.add_mesh(mesh));
-    add(scene, shape, at, material);
-}
-
-fn ball(radius: f32) -> Shape {
-    let center = Vec3::ZERO;
-    Shape::Sphere { center, radius }
-}
-
-/// A floor of 8 metres, and nothing that shines.
-fn floor() -> Scene {
-    let mut scene = Scene::new();
-    let mesh = quad([-4.0, 0.0, 4.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0]).unwrap();
-    add_mesh(
-        &mut scene,
-        mesh,
-        Vec3::ZERO,
-        Material::diffuse("white", [0.8; 3]),
-    );
-    scene
-}
-
-/// A floor with a faceted ball of glass.
-fn glass() -> Scene {
-    let mut scene = floor();
-    let glass = Material::dielectric("glass", 1.5);
-    add_mesh(&mut scene, icosphere(0.7, 3).unwrap(), Vec3::Y, glass);
-    scene
-}
-
-fn lit(mut scene: Scene, light: Light) -> Stage {
-    scene.add_light(light).unwrap();
-    Stage::new(World::new(&scene).unwrap())
-}
-
-fn lamp() -> Light {
-    Light::point([0.4, 3.0, 0.2], [5.0, 4.0, 3.0]).unwrap()
 }
 
 /// Traces on both sides, and holds the GPU to its promise.
