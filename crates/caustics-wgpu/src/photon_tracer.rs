@@ -6,7 +6,7 @@ use crate::pass_layout::{PassLayout, Slot};
 use crate::photon_buffers::PhotonBuffers;
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
-use crate::scene_buffers::SceneBuffers;
+use crate::scene_buffers::{SceneBuffers, fits};
 use crate::shader::{FOOTPRINT_RECORD, Shader, ShaderPiece, shader_piece};
 use crate::trace_params::{MAX_EMITTERS, TraceParams};
 use crate::trace_plan::{PlannedEmitter, TracePlan};
@@ -14,7 +14,7 @@ use crate::trace_plan::{PlannedEmitter, TracePlan};
 /// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
 const WORKGROUP_SIZE: u32 = 64;
 
-const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 28] {
+const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 31] {
     [
         parameters,
         FOOTPRINT_RECORD,
@@ -30,6 +30,7 @@ const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 28] {
         shader_piece!("halton"),
         shader_piece!("point_set"),
         shader_piece!("warp"),
+        shader_piece!("warp_inverse"),
         shader_piece!("ray"),
         shader_piece!("watertight"),
         shader_piece!("sphere"),
@@ -41,6 +42,8 @@ const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 28] {
         shader_piece!("scatter"),
         shader_piece!("differential"),
         shader_piece!("emission"),
+        shader_piece!("area_emission"),
+        shader_piece!("overlap"),
         shader_piece!("ledger"),
         shader_piece!("photon_store"),
         shader_piece!("tracer"),
@@ -134,6 +137,13 @@ impl PhotonTracer {
         }
         // A photon that no dispatch is for has no records.
         recorder.encoder.clear_buffer(&into.links, 0, None);
+        fits(device, "lists of emitters", 4 * plan.lists.len() as u64)?;
+        let lists = filled_buffer(
+            device,
+            "lists of emitters",
+            wgpu::BufferUsages::STORAGE,
+            bytemuck::cast_slice(&plan.lists),
+        )?;
         let mut dispatches = Vec::new();
         for dispatch in dispatches_of(&plan.emitters, &photons) {
             let params = self.params(scene, plan, &photons, &dispatch, into);
@@ -149,7 +159,7 @@ impl PhotonTracer {
                 &scene.vertices,
                 &scene.triangles,
                 &scene.bodies,
-                &scene.cumulative_areas,
+                &lists,
                 &into.records,
                 &into.counters,
                 &into.links,
@@ -198,6 +208,7 @@ impl PhotonTracer {
         let emitters = &plan.emitters[dispatch.emitters.clone()];
         for (slot, emitter) in params.emitters.iter_mut().zip(emitters) {
             *slot = emitter.mirror;
+            slot.first_of_light -= dispatch.emitters.start as u32;
         }
         params
     }
@@ -214,29 +225,35 @@ struct Dispatch {
     dimensions: u32,
 }
 
-/// The fewest dispatches for a range of photons.
+/// The fewest dispatches for a range of photons. Those of one light stay together, since each emitter
+/// asks what the light's earlier ones cover.
 fn dispatches_of(emitters: &[PlannedEmitter], photons: &Range<u32>) -> Vec<Dispatch> {
     let mut all: Vec<Dispatch> = Vec::new();
-    for (index, PlannedEmitter { mirror, dimensions }) in emitters.iter().enumerate() {
-        let start = mirror.first.max(photons.start);
-        let end = (mirror.first + mirror.count).min(photons.end);
+    let mut index = 0;
+    for light in emitters.chunk_by(|a, b| a.mirror.first_of_light == b.mirror.first_of_light) {
+        let of_light = index..index + light.len();
+        index = of_light.end;
+        let [first, last] = [&light[0].mirror, &light[light.len() - 1].mirror];
+        let start = first.first.max(photons.start);
+        let end = (last.first + last.count).min(photons.end);
         if start >= end {
             continue;
         }
+        let dimensions = light[0].dimensions;
         match all.last_mut() {
-            Some(last)
-                if last.dimensions == *dimensions
-                    && last.photons.end == start
-                    && last.emitters.end == index
-                    && last.emitters.len() < MAX_EMITTERS =>
+            Some(before)
+                if before.dimensions == dimensions
+                    && before.photons.end == start
+                    && before.emitters.end == of_light.start
+                    && of_light.end - before.emitters.start <= MAX_EMITTERS =>
             {
-                last.photons.end = end;
-                last.emitters.end = index + 1;
+                before.photons.end = end;
+                before.emitters.end = of_light.end;
             }
             _ => all.push(Dispatch {
                 photons: start..end,
-                emitters: index..index + 1,
-                dimensions: *dimensions,
+                emitters: of_light,
+                dimensions,
             }),
         }
     }
@@ -250,7 +267,8 @@ mod tests {
     use crate::gpu_scene::{Body, NO_PRIMITIVE, Node, SPHERE_BIT, Triangle, Vertex};
     use crate::scene_hierarchy::MAX_LEVELS;
     use crate::shader::{assert_layout, reflection};
-    use crate::trace_params::Emitter;
+    use crate::trace_params::{Emitter, NO_CASTER};
+    use caustics_trace::ProjectionMap;
 
     #[test]
     fn every_variant_is_valid_and_agrees_with_rust() {
@@ -274,6 +292,13 @@ mod tests {
             assert_eq!(constant("EMITTER_CONE"), Emitter::CONE);
             assert_eq!(constant("EMITTER_RECTANGLE"), Emitter::RECTANGLE);
             assert_eq!(constant("EMITTER_AREA"), Emitter::AREA);
+            assert_eq!(constant("SURFACE_OBJECT"), Emitter::SURFACE_OBJECT);
+            assert_eq!(constant("SURFACE_RECTANGLE"), Emitter::SURFACE_RECTANGLE);
+            assert_eq!(constant("SURFACE_DISC"), Emitter::SURFACE_DISC);
+            assert_eq!(constant("SURFACE_CAP"), Emitter::SURFACE_CAP);
+            assert_eq!(constant("NO_CASTER"), NO_CASTER);
+            assert_eq!(constant("NO_MAP"), Emitter::NO_MAP);
+            assert_eq!(constant("MAP_RESOLUTION"), ProjectionMap::RESOLUTION);
         }
     }
 
@@ -313,7 +338,7 @@ mod tests {
                 object,
                 priority,
                 disperses,
-                unused
+                caster
             }
         );
         assert_layout!(
@@ -322,7 +347,7 @@ mod tests {
                 kind,
                 first,
                 count,
-                rows,
+                points,
                 place,
                 generator,
                 share,
@@ -346,6 +371,18 @@ mod tests {
                 first_cumulative,
                 media_count,
                 basis,
+                rows,
+                stream,
+                caster,
+                first_of_light,
+                first_span,
+                span_count,
+                first_map,
+                surface,
+                radius,
+                unused_a,
+                unused_b,
+                unused_c,
             }
         );
         assert_layout!(
@@ -438,19 +475,22 @@ mod tests {
 
     #[test]
     fn photons_of_one_kind_share_a_dispatch() {
-        let emitter = |first, count, dimensions| PlannedEmitter {
+        let emitter = |first, count, first_of_light, dimensions| PlannedEmitter {
             mirror: Emitter {
                 first,
                 count,
+                first_of_light,
                 ..Emitter::default()
             },
             dimensions,
         };
+        // Two emitters of one light, one of which has no photons; others of one each.
         let emitters = vec![
-            emitter(0, 10, 2),
-            emitter(10, 5, 2),
-            emitter(15, 7, 4),
-            emitter(22, 3, 2),
+            emitter(0, 0, 0, 2),
+            emitter(0, 10, 0, 2),
+            emitter(10, 5, 2, 2),
+            emitter(15, 7, 3, 4),
+            emitter(22, 3, 4, 2),
         ];
         let expected = |photons, emitters, dimensions| Dispatch {
             photons,
@@ -460,17 +500,18 @@ mod tests {
         assert_eq!(
             dispatches_of(&emitters, &(0..25)),
             [
-                expected(0..15, 0..2, 2),
-                expected(15..22, 2..3, 4),
-                expected(22..25, 3..4, 2)
+                expected(0..15, 0..3, 2),
+                expected(15..22, 3..4, 4),
+                expected(22..25, 4..5, 2)
             ]
         );
         assert_eq!(
             dispatches_of(&emitters, &(12..17)),
-            [expected(12..15, 1..2, 2), expected(15..17, 2..3, 4)]
+            [expected(12..15, 2..3, 2), expected(15..17, 3..4, 4)]
         );
+        assert_eq!(dispatches_of(&emitters, &(4..9)), [expected(4..9, 0..2, 2)]);
         assert_eq!(dispatches_of(&emitters, &(5..5)), []);
-        let many: Vec<_> = (0..130).map(|first| emitter(first, 1, 2)).collect();
+        let many: Vec<_> = (0..130).map(|first| emitter(first, 1, first, 2)).collect();
         assert_eq!(dispatches_of(&many, &(0..130)).len(), 3);
     }
 }

@@ -21,7 +21,6 @@ pub struct SceneBuffers {
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) bodies: wgpu::Buffer,
-    pub(crate) cumulative_areas: wgpu::Buffer,
     pub(crate) root: u32,
     /// Nodes by row, the leaves first; and where the rows lie in it.
     pub(crate) refit_order: wgpu::Buffer,
@@ -38,7 +37,6 @@ pub(crate) struct SceneCounts {
     pub(crate) vertices: usize,
     pub(crate) triangles: usize,
     pub(crate) bodies: usize,
-    pub(crate) cumulative_areas: usize,
 }
 
 impl SceneBuffers {
@@ -56,8 +54,6 @@ impl SceneBuffers {
         let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
         let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
         let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
-        let areas = &packed.cumulative_areas;
-        let cumulative_areas = upload::<f32>(device, "cumulative areas", areas, &mut bytes)?;
         let (order, rows) = hierarchy.refit_order();
         let refit_order = upload::<u32>(device, "refit order", &order, &mut bytes)?;
         Ok(Self {
@@ -65,7 +61,6 @@ impl SceneBuffers {
             vertices,
             triangles,
             bodies,
-            cumulative_areas,
             root: hierarchy.root(),
             refit_order,
             rows,
@@ -74,7 +69,6 @@ impl SceneBuffers {
                 vertices: packed.vertices.len(),
                 triangles: packed.triangles.len(),
                 bodies: packed.bodies.len(),
-                cumulative_areas: packed.cumulative_areas.len(),
             },
             bytes,
         })

@@ -78,11 +78,6 @@ impl SceneRefit {
             ("vertices", packed.vertices.len(), scene.counts.vertices),
             ("triangles", packed.triangles.len(), scene.counts.triangles),
             ("objects", packed.bodies.len(), scene.counts.bodies),
-            (
-                "primitives that shine",
-                packed.cumulative_areas.len(),
-                scene.counts.cumulative_areas,
-            ),
         ];
         for (what, given, expected) in sizes {
             if given != expected {
@@ -94,14 +89,10 @@ impl SceneRefit {
                 }));
             }
         }
-        let parts: [(&wgpu::Buffer, &[u8]); 4] = [
+        let parts: [(&wgpu::Buffer, &[u8]); 3] = [
             (&scene.vertices, bytemuck::cast_slice(&packed.vertices)),
             (&scene.triangles, bytemuck::cast_slice(&packed.triangles)),
             (&scene.bodies, bytemuck::cast_slice(&packed.bodies)),
-            (
-                &scene.cumulative_areas,
-                bytemuck::cast_slice(&packed.cumulative_areas),
-            ),
         ];
         for (buffer, bytes) in parts {
             if !bytes.is_empty() {

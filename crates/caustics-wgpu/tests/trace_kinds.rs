@@ -5,7 +5,7 @@ mod common;
 use caustics_geometry::shapes::{cuboid, icosphere, quad, torus};
 use caustics_sampling::Sequence;
 use caustics_scene::{Light, Material, World};
-use caustics_trace::{Aim, Branching, Fate, TraceOptions};
+use caustics_trace::{Aim, Branching, EmissionPlan, Fate, TraceOptions};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{PhotonTracer, wgpu};
 
@@ -102,6 +102,72 @@ fn every_light() {
                 let options = TraceOptions { aim, ..options() };
                 hold(gpu, tracer, &format!("{name} {aim:?}"), &stage, &options);
             }
+        }
+    });
+}
+
+#[test]
+fn lights_with_an_area() {
+    with_tracer(|gpu, tracer| {
+        let edges = [[1.0, 0.0, 0.0], [0.0, 0.2, 1.0]];
+        let panel = Light::rectangle([-0.5, 3.0, -0.5], edges, [4.0, 3.0, 2.0]).unwrap();
+        let disc = Light::disc([0.3, 3.0, 0.0], [0.1, -1.0, 0.0], 0.4, [4.0; 3]).unwrap();
+        let bulb = Light::sphere([0.3, 3.0, 0.2], 0.3, [4.0; 3]).unwrap();
+        for (name, light) in [("panel", panel), ("disc", disc), ("bulb", bulb)] {
+            let stage = lit(glass(), light);
+            for aim in [Aim::Casters, Aim::Everywhere] {
+                let options = TraceOptions { aim, ..options() };
+                hold(gpu, tracer, &format!("{name} {aim:?}"), &stage, &options);
+            }
+        }
+    });
+}
+
+/// Casters that hide each other, seen from several lights.
+#[test]
+fn casters_that_overlap() {
+    with_tracer(|gpu, tracer| {
+        let mut scene = floor();
+        let thin = torus(0.8, 0.05, 64, 16).unwrap();
+        for place in 0..3 {
+            let at = Vec3::new(0.5 * place as f32, 0.5 + 0.4 * place as f32, 0.0);
+            let material = Material::dielectric("ring", 1.5);
+            add_mesh(&mut scene, thin.clone(), at, material);
+        }
+        add(
+            &mut scene,
+            ball(0.2),
+            Vec3::new(2.5, 0.4, 0.3),
+            Material::metal("", [0.8; 3]),
+        );
+        scene.add_light(lamp()).unwrap();
+        let spot = Light::spot([2.0, 3.0, 1.0], [-0.5, -1.0, -0.4], [9.0; 3], 0.3, 0.7);
+        scene.add_light(spot.unwrap()).unwrap();
+        let sun = Light::directional([-0.5, -1.0, 0.1], [3.0; 3]).unwrap();
+        scene.add_light(sun).unwrap();
+        let bulb = Light::sphere([-0.5, 3.0, 0.2], 0.3, [4.0; 3]).unwrap();
+        scene.add_light(bulb).unwrap();
+        let stage = Stage::new(World::new(&scene).unwrap());
+        let options = options();
+        for sequence in [Sequence::Grid, Sequence::Sobol] {
+            let options = TraceOptions {
+                sequence,
+                photons: 4 * PHOTONS,
+                ..options
+            };
+            let plan = EmissionPlan::new(&stage.world, &stage.rays, &options).unwrap();
+            assert!(plan.batches().len() > 8);
+            assert!(plan.batches().iter().any(|batch| batch.map().is_some()));
+            let trails = trails_by_cpu(&stage, &options);
+            let ledger = ledger_of(&trails, &stage.plan(&options));
+            assert!(ledger.entry(Fate::Overlap).count > 100, "{ledger:?}");
+            hold(
+                gpu,
+                tracer,
+                &format!("overlap {sequence}"),
+                &stage,
+                &options,
+            );
         }
     });
 }

@@ -1,4 +1,4 @@
-use std::f32::consts::{FRAC_2_PI, FRAC_PI_2};
+use std::f32::consts::FRAC_2_PI;
 
 /// The first digits of a quarter turn: a few times it is exact.
 const QUARTER_HIGH: f32 = 1.570_312_5;
@@ -27,6 +27,8 @@ pub(super) fn sine_cosine(angle: f32) -> (f32, f32) {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::FRAC_PI_2;
+
     use super::*;
 
     #[test]

@@ -40,7 +40,8 @@ struct Body {
     object: u32,
     priority: i32,
     disperses: u32,
-    unused: u32,
+    // What it is a part of that lights aim at; `NO_CASTER` for receivers.
+    caster: u32,
 }
 
 const BODY_RECEIVER: u32 = 0u;

@@ -29,6 +29,7 @@ var<private> pending_count: u32;
 // Flux below which roulette begins.
 var<private> threshold: f32;
 var<private> photon_number: u32;
+var<private> photon_emitter: u32;
 
 fn extended(path: u32, object: u32, event: u32) -> u32 {
     let word = object * 4u + event + 0x9e3779b9u;
@@ -167,13 +168,22 @@ fn advance(branch_given: Branch) {
     }
     count_up(COUNTER_RAYS, 1u);
     let hit = closest_hit(branch.ray);
-    if hit.primitive == NO_PRIMITIVE {
-        book(select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u), branch.flux);
+    let misses = hit.primitive == NO_PRIMITIVE;
+    var point: SurfacePoint;
+    point.body = NO_BODY;
+    if !misses {
+        point = surface_at(branch.ray, hit);
+        if !point.is_valid {
+            book(FATE_INVALID, branch.flux);
+            return;
+        }
+    }
+    if branch.depth == 0u && is_overlap(photon_emitter, branch.ray, point.body) {
+        book(FATE_OVERLAP, branch.flux);
         return;
     }
-    let point = surface_at(branch.ray, hit);
-    if !point.is_valid {
-        book(FATE_INVALID, branch.flux);
+    if misses {
+        book(select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u), branch.flux);
         return;
     }
     let medium = current_medium(branch.media);
@@ -215,10 +225,12 @@ fn trace_photon(number: u32) {
         emitter += 1u;
     }
     photon_number = number;
-    random_start(number);
+    photon_emitter = emitter;
     last_record = 0u;
     pending_count = 0u;
-    let emission = emit(emitter, number - trace.emitters[emitter].first);
+    let point = point_number(emitter, number - trace.emitters[emitter].first);
+    random_start(point, trace.emitters[emitter].stream);
+    let emission = emit(emitter, point);
     if emission.is_valid {
         book(LINE_EMITTED, emission.flux);
         threshold = trace.min_weight * largest(emission.flux);

@@ -106,3 +106,24 @@ fn square_to_sphere_octahedral(uv: vec2<f32>) -> DirectionSample {
         2.0 * side.y * vec3(across_v, d_z),
     );
 }
+
+// Twin: cosine_hemisphere.rs.
+fn square_to_cosine_hemisphere(uv: vec2<f32>) -> DirectionSample {
+    let disc = square_to_disc_concentric(uv);
+    let squared = max(1.0 - dot(disc.value, disc.value), 0.0);
+    let near = sqrt(max(squared, 4.0 * POLE_DISTANCE));
+    return DirectionSample(
+        vec3(disc.value, sqrt(squared)),
+        vec3(disc.d_du, -dot(disc.value, disc.d_du) / near),
+        vec3(disc.d_dv, -dot(disc.value, disc.d_dv) / near),
+    );
+}
+
+// A sample of directions in a frame, turned to the world's axes.
+fn sample_from_frame(tangents: Tangents, normal: vec3<f32>, local: DirectionSample) -> DirectionSample {
+    return DirectionSample(
+        from_frame(tangents, normal, local.value),
+        from_frame(tangents, normal, local.d_du),
+        from_frame(tangents, normal, local.d_dv),
+    );
+}

@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use caustics_sampling::PointSet;
 use caustics_scene::gltf::load_path;
 use caustics_scene::{BvhOptions, SceneIntersector, World};
 use caustics_trace::{
-    EmissionSample, Emitter, EnergyLedger, Fate, MediumStack, Photon, PhotonTrail, TraceOptions,
-    trace_photon,
+    EmissionPlan, EnergyLedger, Fate, Photon, PhotonTrail, TraceOptions, trace_photon,
 };
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
@@ -59,28 +57,9 @@ impl Stage {
 /// The trails of all photons by the CPU, in the order of their numbers.
 pub fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
     let Stage { world, rays } = stage;
-    let emitters = Emitter::all(world, options.aim);
-    let counts = Emitter::share(&emitters, options.photons);
-    let mut trails = Vec::new();
-    for (emitter, &count) in emitters.iter().zip(&counts) {
-        let media = emitter.start().map_or(MediumStack::EMPTY, |start| {
-            MediumStack::at(world, rays, start)
-        });
-        let points = PointSet::new(options.sequence, count, options.seed);
-        for index in 0..count {
-            let sample = EmissionSample::of(&points, index);
-            let number = trails.len() as u32;
-            let trail = if emitter.dimensions() == 2 {
-                let emission = emitter.emit::<2>(&sample);
-                emission.map(|it| trace_photon(world, rays, options, &it, media, number))
-            } else {
-                let emission = emitter.emit::<4>(&sample);
-                emission.map(|it| trace_photon(world, rays, options, &it, media, number))
-            };
-            trails.push(trail.transpose().unwrap().unwrap_or_default());
-        }
-    }
-    trails
+    let plan = EmissionPlan::new(world, rays, options).unwrap();
+    let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
+    (0..plan.count()).map(trail).collect()
 }
 
 /// The shared device, and the tracer that its tests share.
@@ -251,7 +230,8 @@ pub fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedger {
     for trail in trails {
         ledger.merge(&trail.ledger);
     }
-    ledger.emit_unaimed(plan.power() - ledger.emitted().flux);
+    let overlap = ledger.entry(Fate::Overlap).flux;
+    ledger.emit_unaimed(plan.power() - (ledger.emitted().flux - overlap));
     ledger
 }
 
