@@ -16,7 +16,7 @@ use common::tracing::{
 
 type Gpu = (wgpu::Device, wgpu::Queue);
 
-const PHOTONS: u32 = 8_000;
+const PHOTONS: u32 = 4_000;
 
 fn options() -> TraceOptions {
     TraceOptions {
@@ -30,6 +30,7 @@ fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &T
     let plan = stage.plan(options);
     let traced = trace_on_gpu(gpu, tracer, stage, &plan, 8 * PHOTONS);
     let trails = trails_by_cpu(stage, options);
+    assert_eq!(traced.counters.crowded.count, 0, "{name}");
     let difference = Difference::between(&stage.world, &trails, &traced);
     let ledger = ledger_of(&trails, &plan);
     println!("{name}: {:?} {:?}", difference.equal_records, difference);

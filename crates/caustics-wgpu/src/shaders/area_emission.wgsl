@@ -35,7 +35,9 @@ fn area_place(emitter: u32, sample: vec2<f32>) -> AreaPlace {
     } else if surface == SURFACE_DISC {
         let local = square_to_disc_concentric(sample);
         let normal = place.normal;
-        place.spawn.position = origin + from_frame(tangents, normal, vec3(radius * local.value, 0.0));
+        // Rounded, or compilers sum and multiply in another order.
+        let across = vec3(rounded(radius * local.value.x), rounded(radius * local.value.y), 0.0);
+        place.spawn.position = origin + rounded_vector(from_frame(tangents, normal, across));
         place.d_du = from_frame(tangents, normal, vec3(radius * local.d_du, 0.0));
         place.d_dv = from_frame(tangents, normal, vec3(radius * local.d_dv, 0.0));
     } else if surface == SURFACE_CAP {

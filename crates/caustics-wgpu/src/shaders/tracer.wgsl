@@ -1,7 +1,9 @@
 // From light to receiver. Twins: tracer.rs and trace.rs in caustics-trace.
 
-// Branches of one photon that wait; beyond it their light is booked as crowded.
-const MAX_PENDING: u32 = 24u;
+// Branches of one photon that wait. Where no more than a few have room left, photons go one way, as
+// with `BRANCHING_ROULETTE`; what finds no room even so is booked as crowded.
+const MAX_PENDING: u32 = 28u;
+const RESERVED_PENDING: u32 = 4u;
 
 // The longest change of direction that a differential keeps. Twin: `DIRECTION_CHANGE_LIMIT`.
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
@@ -139,8 +141,10 @@ fn branch_out(branch_given: Branch, point: SurfacePoint) {
         book(FATE_ABSORBED, branch_given.flux * scattering.absorbed);
     }
     let both = scattering.count == 2u;
-    let splits = trace.branching == BRANCHING_SPLIT_ALL
+    let has_room = pending_count + RESERVED_PENDING <= MAX_PENDING;
+    let may_split = trace.branching == BRANCHING_SPLIT_ALL
         || (trace.branching == BRANCHING_SPLIT_FIRST && !branch_given.has_split);
+    let splits = may_split && has_room;
     var branch = branch_given;
     branch.has_split = branch_given.has_split || (both && splits);
     let side = select(-1.0, 1.0, point.from_outside);
