@@ -32,7 +32,8 @@ usage: render [options] [scene.glb | scene.gltf]
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
                                                                     (split-all)
   --refine LEVELS           divide cells of the lattice at edges, so often (0)
-  --aim NAME                where lights aim: casters, everywhere   (casters)
+  --aim NAME                where lights aim: casters, cones around them, everywhere
+                                                                    (casters)
   --out FILE.png            the picture                             (caustics.png)
   --caustics-only FILE.exr  the caustics alone, linear radiance
   --direct-only FILE.exr    the direct light alone, linear radiance
@@ -152,7 +153,11 @@ impl Arguments {
                 trace.aim = choice(
                     name,
                     parser,
-                    &[("casters", Aim::Casters), ("everywhere", Aim::Everywhere)],
+                    &[
+                        ("casters", Aim::Casters),
+                        ("cones", Aim::Cones),
+                        ("everywhere", Aim::Everywhere),
+                    ],
                 )?;
             }
             "visibility" => {

@@ -1,8 +1,9 @@
 use std::f32::consts::FRAC_1_PI;
 
 use caustics_accel::Intersect;
-use caustics_geometry::Ray;
+use caustics_geometry::{Frame, Ray};
 use caustics_sampling::CounterRng;
+use caustics_sampling::warp::Cone;
 use caustics_scene::{AreaLight, Light, World};
 use glam::{Vec2, Vec3};
 
@@ -30,11 +31,19 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
     }
 
     /// Radiance that a Lambertian receiver reflects towards the eye, in W/(sr m²): exact for
-    /// point, spot and directional lights, from one random point on each area light.
+    /// point, spot and directional lights, from one random point on each light with an area.
     pub fn radiance(&self, receiver: &Receiver, rng: &mut CounterRng) -> Vec3 {
         let mut irradiance = Vec3::ZERO;
         for light in self.world.lights() {
-            irradiance += self.arriving_from(receiver, light);
+            irradiance += match *light {
+                Light::Sphere {
+                    center,
+                    radius,
+                    radiance,
+                } => self.arriving_from_ball(receiver, center, radius, radiance, rng),
+                _ if light.area().is_some() => self.arriving_from_surface(receiver, light, rng),
+                _ => self.arriving_from(receiver, light),
+            };
         }
         for light in self.world.emitters() {
             irradiance += self.arriving_from_area(receiver, light, rng);
@@ -69,6 +78,66 @@ impl<'a, I: Intersect + ?Sized> DirectLight<'a, I> {
             return Vec3::ZERO;
         }
         cosine * facing
+    }
+
+    /// From one random point of a rectangle or a disc.
+    fn arriving_from_surface(
+        &self,
+        receiver: &Receiver,
+        light: &Light,
+        rng: &mut CounterRng,
+    ) -> Vec3 {
+        let (Some(on_light), Some(area)) = (light.point_on(rng.next_vec2()), light.area()) else {
+            return Vec3::ZERO;
+        };
+        let to_light = on_light.position - receiver.point.spawn.position;
+        let distance = to_light.length();
+        if distance <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let direction = to_light / distance;
+        let leaving = -direction.dot(on_light.normal);
+        let cosine = self.cosine(receiver, direction);
+        if leaving <= 0.0 || cosine <= 0.0 || self.is_blocked(receiver, direction, distance) {
+            return Vec3::ZERO;
+        }
+        light.radiance() * (area * leaving * cosine / (distance * distance))
+    }
+
+    /// From one random direction into the cone that a ball fills; it shines outwards only.
+    fn arriving_from_ball(
+        &self,
+        receiver: &Receiver,
+        center: Vec3,
+        radius: f32,
+        radiance: Vec3,
+        rng: &mut CounterRng,
+    ) -> Vec3 {
+        let sample = rng.next_vec2();
+        let to_center = center - receiver.point.spawn.position;
+        let distance = to_center.length();
+        if distance <= radius {
+            return Vec3::ZERO;
+        }
+        let Ok(cone) = Cone::from_sine(radius / distance) else {
+            return Vec3::ZERO;
+        };
+        let local = cone.sample_concentric(sample).value;
+        let direction = Frame::from_normal(to_center / distance)
+            .to_world(local)
+            .normalize();
+        let cosine = self.cosine(receiver, direction);
+        if cosine <= 0.0 {
+            return Vec3::ZERO;
+        }
+        // The nearer end of the chord.
+        let along = to_center.dot(direction);
+        let across = (to_center - along * direction).length_squared();
+        let near = along - (radius * radius - across).max(0.0).sqrt();
+        if self.is_blocked(receiver, direction, near) {
+            return Vec3::ZERO;
+        }
+        radiance * (cone.solid_angle() * cosine)
     }
 
     fn arriving_from_area(

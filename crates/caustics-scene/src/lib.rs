@@ -39,7 +39,7 @@
 //! | type | what |
 //! | --- | --- |
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
-//! | [`Light`] | point, spot and directional lights |
+//! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, discs and balls that shine |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
 //! | [`World`], [`Object`] | the scene flattened |
@@ -75,6 +75,7 @@ mod camera;
 pub mod gltf;
 mod intersector;
 mod light;
+mod light_point;
 mod material;
 mod point_on;
 mod scene;
@@ -86,6 +87,7 @@ pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
 pub use intersector::SceneIntersector;
 pub use light::{Light, LightError};
+pub use light_point::LightPoint;
 pub use material::{MAX_ATTENUATION, Material, MaterialError, Surface};
 pub use scene::{Instance, MaterialId, MeshId, Scene, SceneError, Shape};
 pub use surface_point::SurfacePoint;

@@ -1,10 +1,14 @@
-//! Lights without extent.
+//! Lights that no ray can hit: points, directions and areas.
 
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
 
-/// A light that no ray can hit. Lights with an area are objects with an emissive [`Material`].
+/// A light that no ray can hit.
+///
+/// The lights with an area shine evenly and in all directions of their side (Lambertian emission).
+/// They cast no shadow and are not seen themselves: one that is to be seen is an object with an
+/// emissive [`Material`].
 ///
 /// Directions are unit vectors. The constructors check their arguments; a light put together by
 /// hand is checked when it enters a scene.
@@ -50,6 +54,35 @@ pub enum Light {
         direction: Vec3,
         /// Irradiance on a plane that faces the light, RGB, in W/m^2.
         irradiance: Vec3,
+    },
+    /// A parallelogram that shines to the side of `edges[0] x edges[1]`.
+    Rectangle {
+        /// One corner, in metres.
+        corner: Vec3,
+        /// The two edges from there, in metres; not parallel.
+        edges: [Vec3; 2],
+        /// Radiance, RGB, in W/(sr m^2).
+        radiance: Vec3,
+    },
+    /// A disc that shines to one side.
+    Disc {
+        /// Where it is, in metres.
+        center: Vec3,
+        /// The side to which it shines, a unit vector.
+        normal: Vec3,
+        /// In metres, above 0.
+        radius: f32,
+        /// Radiance, RGB, in W/(sr m^2).
+        radiance: Vec3,
+    },
+    /// A ball that shines outwards.
+    Sphere {
+        /// Where it is, in metres.
+        center: Vec3,
+        /// In metres, above 0.
+        radius: f32,
+        /// Radiance, RGB, in W/(sr m^2).
+        radiance: Vec3,
     },
 }
 
@@ -114,8 +147,65 @@ impl Light {
         light.validate().map(|()| light)
     }
 
+    /// A parallelogram with this corner and edges in metres, which shines with this radiance in
+    /// W/(sr m^2) to the side of `edges[0] x edges[1]`.
+    ///
+    /// # Errors
+    /// A number is not finite, a radiance is negative, or the edges span no area.
+    pub fn rectangle(
+        corner: impl Into<Vec3>,
+        edges: [impl Into<Vec3>; 2],
+        radiance: impl Into<Vec3>,
+    ) -> Result<Self, LightError> {
+        let light = Self::Rectangle {
+            corner: corner.into(),
+            edges: edges.map(Into::into),
+            radiance: radiance.into(),
+        };
+        light.validate().map(|()| light)
+    }
+
+    /// A disc of this radius in metres, which shines with this radiance in W/(sr m^2) to the side of
+    /// `normal` (of any length).
+    ///
+    /// # Errors
+    /// A number is not finite, a radiance is negative, the normal is zero, or the radius is not
+    /// above zero.
+    pub fn disc(
+        center: impl Into<Vec3>,
+        normal: impl Into<Vec3>,
+        radius: f32,
+        radiance: impl Into<Vec3>,
+    ) -> Result<Self, LightError> {
+        let light = Self::Disc {
+            center: center.into(),
+            normal: unit(normal.into())?,
+            radius,
+            radiance: radiance.into(),
+        };
+        light.validate().map(|()| light)
+    }
+
+    /// A ball of this radius in metres, which shines outwards with this radiance in W/(sr m^2).
+    ///
+    /// # Errors
+    /// A number is not finite, a radiance is negative, or the radius is not above zero.
+    pub fn sphere(
+        center: impl Into<Vec3>,
+        radius: f32,
+        radiance: impl Into<Vec3>,
+    ) -> Result<Self, LightError> {
+        let light = Self::Sphere {
+            center: center.into(),
+            radius,
+            radiance: radiance.into(),
+        };
+        light.validate().map(|()| light)
+    }
+
     /// Radiant intensity in W/sr that the light sends along a unit direction; zero for a
-    /// directional light, which has none.
+    /// directional light, which has none, and for lights with an area, which
+    /// [`point_on`](Self::point_on) describes.
     ///
     /// A spot light falls off as `KHR_lights_punctual` recommends: with `t` running from 0 at the
     /// outer cone to 1 at the inner one in the cosine, its intensity is scaled by `t^2`.
@@ -130,7 +220,10 @@ impl Light {
                 outer_cos,
                 ..
             } => intensity * spot_falloff(axis.dot(direction), inner_cos, outer_cos),
-            Self::Directional { .. } => Vec3::ZERO,
+            Self::Directional { .. }
+            | Self::Rectangle { .. }
+            | Self::Disc { .. }
+            | Self::Sphere { .. } => Vec3::ZERO,
         }
     }
 
@@ -138,7 +231,8 @@ impl Light {
     /// depends on the area it is let shine on.
     ///
     /// A point light's is `4 pi` times its intensity. A spot light's is the integral of its falloff,
-    /// `2 pi (1 - inner_cos) + 2 pi (inner_cos - outer_cos) / 3` times its intensity.
+    /// `2 pi (1 - inner_cos) + 2 pi (inner_cos - outer_cos) / 3` times its intensity. That of a light
+    /// with an area is `pi` times area and radiance.
     #[must_use]
     pub fn flux(&self) -> Option<Vec3> {
         match *self {
@@ -153,6 +247,9 @@ impl Light {
                 Some(solid_angle * intensity)
             }
             Self::Directional { .. } => None,
+            Self::Rectangle { radiance, .. }
+            | Self::Disc { radiance, .. }
+            | Self::Sphere { radiance, .. } => self.area().map(|area| PI * area * radiance),
         }
     }
 
@@ -192,6 +289,39 @@ impl Light {
             } => {
                 is_unit(direction)?;
                 positive(irradiance)
+            }
+            Self::Rectangle {
+                corner,
+                edges,
+                radiance,
+            } => {
+                finite(corner)?;
+                edges.into_iter().try_for_each(finite)?;
+                finite(corner + edges[0] + edges[1])?;
+                has_area(self.area())?;
+                positive(radiance)
+            }
+            Self::Disc {
+                center,
+                normal,
+                radius,
+                radiance,
+            } => {
+                finite(center)?;
+                is_unit(normal)?;
+                is_radius(radius)?;
+                has_area(self.area())?;
+                positive(radiance)
+            }
+            Self::Sphere {
+                center,
+                radius,
+                radiance,
+            } => {
+                finite(center)?;
+                is_radius(radius)?;
+                has_area(self.area())?;
+                positive(radiance)
             }
         }
     }
@@ -247,6 +377,23 @@ fn positive(intensity: Vec3) -> Result<(), LightError> {
     }
 }
 
+fn is_radius(radius: f32) -> Result<(), LightError> {
+    if radius > 0.0 && radius.is_finite() {
+        Ok(())
+    } else {
+        Err(LightError::Radius { radius })
+    }
+}
+
+fn has_area(area: Option<f32>) -> Result<(), LightError> {
+    match area {
+        Some(area) if !(area >= f32::MIN_POSITIVE && area.is_finite()) => {
+            Err(LightError::Area { area })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A light that makes no physical sense.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -269,6 +416,19 @@ pub enum LightError {
     Intensity {
         /// The offending channel.
         value: f32,
+    },
+    /// A radius that is not above zero or not finite.
+    #[error("radius {radius} is not a finite number above 0")]
+    Radius {
+        /// The radius, in metres.
+        radius: f32,
+    },
+    /// A shape whose area is zero (edges that are parallel, lengths whose square is too small for
+    /// an f32) or not finite.
+    #[error("area {area} is not a finite number above 0")]
+    Area {
+        /// The area, in square metres.
+        area: f32,
     },
     /// Cone angles out of range or out of order.
     #[error("cone angles {inner} and {outer} break 0 <= inner < outer <= pi/2")]
@@ -354,6 +514,24 @@ mod tests {
         assert!(Light::point([0.0; 3], [1.0, -1.0, 1.0]).is_err());
         assert!(Light::point([0.0; 3], [f32::INFINITY; 3]).is_err());
         assert!(Light::directional([0.0; 3], [1.0; 3]).is_err());
+        let (x, z, radiance) = ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]);
+        for (edges, is_valid) in [
+            ([x, z], true),
+            ([x, [2.0, 0.0, 0.0]], false),
+            ([x, [f32::NAN, 0.0, 1.0]], false),
+            ([[1e30, 0.0, 0.0], [0.0, 0.0, 1e30]], false),
+        ] {
+            let light = Light::rectangle([0.0; 3], edges, radiance);
+            assert_eq!(light.is_ok(), is_valid, "{edges:?}");
+        }
+        for (radius, is_valid) in [(1.0, true), (0.0, false), (-1.0, false), (f32::NAN, false)] {
+            let disc = Light::disc([0.0; 3], z, radius, radiance);
+            assert_eq!(disc.is_ok(), is_valid, "{radius}");
+            let ball = Light::sphere([0.0; 3], radius, radiance);
+            assert_eq!(ball.is_ok(), is_valid, "{radius}");
+        }
+        assert!(Light::disc([0.0; 3], [0.0; 3], 1.0, radiance).is_err());
+        assert!(Light::sphere([0.0; 3], 1.0, [-1.0; 3]).is_err());
         for (inner, outer) in [
             (0.5, 0.5),
             (0.6, 0.5),

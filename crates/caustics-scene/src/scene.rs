@@ -204,7 +204,7 @@ impl Scene {
         &self.instances
     }
 
-    /// The lights without extent, in the order in which they were added.
+    /// The lights that are no objects, in the order in which they were added.
     #[must_use]
     pub fn lights(&self) -> &[Light] {
         &self.lights

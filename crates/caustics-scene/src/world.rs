@@ -253,7 +253,7 @@ impl World {
         &self.materials
     }
 
-    /// The lights without extent, in the scene's order.
+    /// The lights that are no objects, in the scene's order.
     #[must_use]
     pub fn lights(&self) -> &[Light] {
         &self.lights

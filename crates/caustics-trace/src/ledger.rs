@@ -12,9 +12,13 @@ pub enum Fate {
     Escaped,
     /// Left the scene without meeting anything.
     Missed,
-    /// Emitted outside the directions or the disc that holds the specular objects; not traced,
+    /// Emitted outside the directions or the rectangles that hold the specular objects; not traced,
     /// because it can make no caustic.
     Unaimed,
+    /// Emitted a second time: where the directions to two casters overlap as their light sees them,
+    /// photons are aimed at either, and those of one of them stand for the light. Traced, but no
+    /// part of the lights' power.
+    Overlap,
     /// Met a receiver before anything specular: direct light, which is not a caustic.
     Direct,
     /// Cut off at the maximum depth.
@@ -27,12 +31,13 @@ pub enum Fate {
 
 impl Fate {
     /// All fates, in the order of the ledger's lines.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Stored,
         Self::Absorbed,
         Self::Escaped,
         Self::Missed,
         Self::Unaimed,
+        Self::Overlap,
         Self::Direct,
         Self::TooDeep,
         Self::Roulette,
@@ -48,6 +53,7 @@ impl Fate {
             Self::Escaped => "escaped",
             Self::Missed => "missed",
             Self::Unaimed => "unaimed",
+            Self::Overlap => "overlap",
             Self::Direct => "direct",
             Self::TooDeep => "too deep",
             Self::Roulette => "roulette",
@@ -108,7 +114,7 @@ pub struct EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// What the lights emitted.
+    /// What the lights emitted, and what was emitted a second time ([`Fate::Overlap`]).
     #[must_use]
     pub fn emitted(&self) -> LedgerEntry {
         self.emitted
@@ -163,6 +169,31 @@ impl EnergyLedger {
     /// Books flux that a surviving path was given.
     pub fn gain(&mut self, flux: Vec3) {
         self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// What one photon did, as a short list, and back.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = (u8, LedgerEntry)> {
+        let gain = LedgerEntry {
+            count: 0,
+            flux: self.roulette_gain,
+        };
+        let all = [self.emitted, gain].into_iter().chain(self.fates);
+        (0u8..)
+            .zip(all)
+            .filter(|(_, entry)| entry.count > 0 || entry.flux != DVec3::ZERO)
+    }
+
+    /// Adds a line of [`lines`](Self::lines).
+    pub(crate) fn add_line(&mut self, line: u8, entry: &LedgerEntry) {
+        match line {
+            0 => self.emitted.merge(entry),
+            1 => self.roulette_gain += entry.flux,
+            _ => {
+                if let Some(fate) = self.fates.get_mut(usize::from(line) - 2) {
+                    fate.merge(entry);
+                }
+            }
+        }
     }
 
     /// Takes back another ledger's entries: its photons are to count as not emitted. Its rays stay

@@ -56,10 +56,14 @@
 //! | --- | --- | --- |
 //! | trace photons | [`trace_photons`], [`TraceOptions`] | Jensen 1996 |
 //! | choose where they go at a surface of glass | [`Branching`] | Arvo, Kirk 1990 |
-//! | aim lights at what makes caustics | [`Aim`], [`Emitter`], [`Emission`], [`EmissionSample`] | |
-//! | make the same photons elsewhere, or follow one of them alone | [`EmitterDomain`], [`trace_photon`], [`PhotonTrail`] | |
+//! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
+//! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`], [`trace_part`] | |
+//! | keep photons from frame to frame, and trace anew what a change demands | [`LivePhotons`], [`Change`] | |
+//! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
+//! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
+//! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
 //! | carry derivatives along any path, from a light or the eye | [`RayDifferential`] | Igehy 1999 |
 //! | reflect, refract, and weigh the two | [`reflect`], [`refract`], [`fresnel_dielectric`], [`fresnel_schlick`] | Born, Wolf, section 1.5; Schlick 1994 |
@@ -108,26 +112,39 @@
 //! - Schmidt, Budge, *Simple Nested Dielectrics in Ray Traced Images*, Journal of Graphics Tools
 //!   2002.
 
-mod aim;
 mod area_emission;
+mod casters;
+mod compact;
 mod differential;
+mod domain;
 mod emission;
-mod emitter_domain;
+mod emitter;
+mod lattice;
 mod ledger;
+mod live;
 mod media;
 mod optics;
 mod options;
+mod outline;
 mod photon;
+mod plan;
+mod projection_map;
 mod refine;
 mod scatter;
 mod trace;
 mod tracer;
+mod trail;
 
+pub use area_emission::AreaSurface;
+pub use casters::{Casters, MAX_CASTERS};
+pub use compact::{CompactFootprint, CompactPhoton};
 pub use differential::RayDifferential;
-pub use emission::{Emission, EmissionSample, Emitter};
-pub use emitter_domain::EmitterDomain;
+pub use domain::EmissionDomain;
+pub use emission::{Emission, EmissionSample};
+pub use emitter::{Emitter, LightSource};
 pub use glam;
 pub use ledger::{EnergyLedger, Fate, LedgerEntry};
+pub use live::{Change, LivePhotons};
 pub use media::{Crossing, MediumStack};
 pub use optics::{
     CHANNEL_WAVELENGTHS, beer_lambert, dispersed_ior, fresnel_dielectric, fresnel_schlick, reflect,
@@ -135,5 +152,7 @@ pub use optics::{
 };
 pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
 pub use photon::{Photon, PhotonMap};
+pub use plan::{EmissionBatch, EmissionPlan};
+pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::{PhotonTrail, trace_photon, trace_photons};
+pub use trace::{PhotonTrail, trace_part, trace_photon, trace_photons, trace_plan};

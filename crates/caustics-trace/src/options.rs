@@ -24,8 +24,11 @@ pub enum Aim {
     /// Into every direction in which the light shines. A directional light covers the bounding
     /// sphere of the scene.
     Everywhere,
-    /// Into a cone (or, for a directional light, a disc) that holds the bounding sphere of all
-    /// specular objects. Nothing that could become a caustic is left out.
+    /// At each specular object, or group of objects that nest, into the cone (or, for a directional
+    /// light, the rectangle) that just holds it. Nothing that could become a caustic is left out.
+    Cones,
+    /// Likewise, but only into those parts of the cone or the rectangle where the caster's own
+    /// outline is, where finding it costs less than it saves.
     #[default]
     Casters,
 }
@@ -47,6 +50,9 @@ pub struct TraceOptions {
     pub min_weight: f32,
     /// Where the lights aim.
     pub aim: Aim,
+    /// The least number of photons that each pair of a light and a caster gets, as a part of an
+    /// equal share: a strong light does not starve a weak one. In 0..=1.
+    pub share_floor: f32,
     /// The points that choose emission directions and positions.
     pub sequence: Sequence,
     /// Where the lattice is made finer.
@@ -88,6 +94,7 @@ impl Default for TraceOptions {
             branching: Branching::SplitAll,
             min_weight: 0.03,
             aim: Aim::Casters,
+            share_floor: 0.25,
             sequence: Sequence::Grid,
             refinement: Refinement::default(),
         }
@@ -110,6 +117,11 @@ impl TraceOptions {
                 detail: self.refinement.detail,
             });
         }
+        if !(0.0..=1.0).contains(&self.share_floor) {
+            return Err(TraceError::ShareFloor {
+                share_floor: self.share_floor,
+            });
+        }
         if self.max_depth < 2 {
             return Err(TraceError::MaxDepth {
                 max_depth: self.max_depth,
@@ -128,6 +140,12 @@ pub enum TraceError {
     MinWeight {
         /// The threshold.
         min_weight: f32,
+    },
+    /// A floor that is not a part of an equal share.
+    #[error("the floor of shares {share_floor} is not between 0 and 1")]
+    ShareFloor {
+        /// The floor, in parts of an equal share.
+        share_floor: f32,
     },
     /// A detail that is no length.
     #[error("the detail of refinement {detail} is not a finite number of at least 0")]

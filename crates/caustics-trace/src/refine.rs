@@ -8,7 +8,6 @@ use crate::emission::EmissionSample;
 use crate::ledger::EnergyLedger;
 use crate::photon::{Photon, PhotonMap};
 use crate::trace::Batch;
-use crate::tracer::PathTracer;
 
 /// The part of all photons that the first, even lattice gets.
 const FIRST_SHARE: f64 = 0.5;
@@ -43,9 +42,9 @@ pub(crate) fn trace_refined<I: Intersect + ?Sized>(
     detail: f32,
     progress: &(dyn Fn(u32) + Sync),
 ) -> PhotonMap {
-    let budget = batch.count;
+    let budget = batch.planned.count();
     let mut map = PhotonMap::default();
-    let resolution = first_resolution(budget, batch.emitter.aspect());
+    let resolution = first_resolution(budget, batch.planned.emitter().aspect());
     let cells = (0..resolution.y).flat_map(|y| (0..resolution.x).map(move |x| UVec2::new(x, y)));
     let mut level = Level::trace(batch, resolution, cells.collect());
     let mut spent = level.cells.len() as u32;
@@ -384,7 +383,7 @@ fn trace_cells<I: Intersect + ?Sized>(
     resolution: UVec2,
     cells: &[UVec2],
 ) -> Part {
-    let mut tracer = PathTracer::<I, 2>::new(batch.world, batch.intersect, batch.options);
+    let mut tracer = batch.tracer::<2>();
     let seed = batch.options.seed;
     let place = if seed == 0 {
         Vec2::splat(0.5)
@@ -401,11 +400,11 @@ fn trace_cells<I: Intersect + ?Sized>(
             place: Vec2::ZERO,
             count: resolution.x * resolution.y,
         };
-        if let Some(emission) = batch.emitter.emit::<2>(&sample) {
+        if let Some(emission) = batch.planned.emitter().emit::<2>(batch.world, &sample) {
             let number = u64::from(cell.y) * u64::from(resolution.x) + u64::from(cell.x);
             let stream = number ^ (u64::from(resolution.x) << 40);
-            let mut rng = CounterRng::new(seed, u64::from(batch.first).wrapping_add(stream));
-            tracer.trace(&emission, batch.media, &mut rng);
+            let mut rng = batch.planned.random(seed, stream);
+            tracer.trace(&emission, batch.planned.media(), &mut rng);
         }
     }
     Part {

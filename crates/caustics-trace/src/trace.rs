@@ -1,12 +1,13 @@
 use caustics_accel::Intersect;
-use caustics_sampling::{CounterRng, PointSet, Sequence};
+use caustics_sampling::Sequence;
 use caustics_scene::World;
+use glam::DVec3;
 
-use crate::emission::{Emission, EmissionSample, Emitter};
-use crate::ledger::EnergyLedger;
-use crate::media::MediumStack;
+use crate::emission::EmissionSample;
+use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
+use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
 use crate::tracer::PathTracer;
 
@@ -16,9 +17,9 @@ const CHUNK: u32 = 2048;
 /// Traces photons from all lights of `world` and returns those that landed after at least one
 /// specular event, with the ledger of where all the energy went.
 ///
-/// The photons are shared among the lights by the power that each sends towards the specular
-/// objects. The result does not depend on the number of threads. `progress` is called with the
-/// number of photons just finished, from any thread.
+/// The photons are shared among the pairs of a light and a caster as [`EmissionPlan`] says. The
+/// result does not depend on the number of threads. `progress` is called with the number of photons
+/// just finished, from any thread.
 ///
 /// # Errors
 /// If the options are out of range.
@@ -28,39 +29,95 @@ pub fn trace_photons<I: Intersect + ?Sized>(
     options: &TraceOptions,
     progress: &(dyn Fn(u32) + Sync),
 ) -> Result<PhotonMap, TraceError> {
+    let plan = EmissionPlan::new(world, intersect, options)?;
+    trace_plan(world, intersect, &plan, options, progress)
+}
+
+/// Traces the photons of a plan that was made for the same world and options.
+///
+/// # Errors
+/// If the options are out of range.
+pub fn trace_plan<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    plan: &EmissionPlan,
+    options: &TraceOptions,
+    progress: &(dyn Fn(u32) + Sync),
+) -> Result<PhotonMap, TraceError> {
     options.validate()?;
-    let emitters = Emitter::all(world, options.aim);
-    let counts = Emitter::share(&emitters, options.photons);
+    let mut map = PhotonMap::default();
+    for of_light in plan.lights() {
+        let before = counted(&map);
+        for (number, planned) in of_light.iter().enumerate() {
+            let batch = Batch {
+                world,
+                intersect,
+                options,
+                plan,
+                planned,
+                earlier: &of_light[..number],
+            };
+            if batch.is_refined() {
+                let levels = options.refinement.levels;
+                let detail =
+                    options.refinement.detail * world.specular_bounds().diagonal().length();
+                let mut refined = trace_refined(&batch, levels, detail, progress);
+                map.photons.append(&mut refined.photons);
+                map.ledger.merge(&refined.ledger);
+            } else if planned.emitter().dimensions() == 2 {
+                batch.trace::<2>(&mut map, 0..planned.count(), progress);
+            } else {
+                batch.trace::<4>(&mut map, 0..planned.count(), progress);
+            }
+        }
+        if let Some(first) = of_light.first() {
+            let aimed = counted(&map) - before;
+            map.ledger.emit_unaimed(first.emitter().power() - aimed);
+        }
+    }
+    Ok(map)
+}
+
+/// Traces some of the photons of a plan, counted over all its batches in their order; numbers from
+/// [`EmissionPlan::count`] on are no photons.
+///
+/// Over ranges that join to all of them, photons and ledgers are those of [`trace_plan`], but for
+/// what is not aimed at, which no ledger of a part has: for a host that has a few milliseconds in
+/// each frame, or that hands photons on as they come.
+///
+/// # Errors
+/// If the options are out of range. Those that ask for a [`Refinement`](crate::Refinement) are taken
+/// as if they did not: its photons depend on each other.
+pub fn trace_part<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    plan: &EmissionPlan,
+    options: &TraceOptions,
+    photons: std::ops::Range<u32>,
+) -> Result<PhotonMap, TraceError> {
+    options.validate()?;
     let mut map = PhotonMap::default();
     let mut first = 0u32;
-    for (emitter, &count) in emitters.iter().zip(&counts) {
-        let media = emitter.start().map_or(MediumStack::EMPTY, |start| {
-            MediumStack::at(world, intersect, start)
-        });
-        let batch = Batch {
-            world,
-            intersect,
-            options,
-            emitter,
-            media,
-            first,
-            count,
-        };
-        let before = map.ledger.emitted().flux;
-        if batch.is_refined() {
-            let levels = options.refinement.levels;
-            let detail = options.refinement.detail * world.specular_bounds().diagonal().length();
-            let mut refined = trace_refined(&batch, levels, detail, progress);
-            map.photons.append(&mut refined.photons);
-            map.ledger.merge(&refined.ledger);
-        } else if emitter.dimensions() == 2 {
-            batch.trace::<2>(&mut map, progress);
-        } else {
-            batch.trace::<4>(&mut map, progress);
+    for of_light in plan.lights() {
+        for (number, planned) in of_light.iter().enumerate() {
+            let batch = Batch {
+                world,
+                intersect,
+                options,
+                plan,
+                planned,
+                earlier: &of_light[..number],
+            };
+            let count = planned.count();
+            let within = photons.start.saturating_sub(first).min(count)
+                ..photons.end.saturating_sub(first).min(count);
+            if planned.emitter().dimensions() == 2 {
+                batch.trace::<2>(&mut map, within, &|_| {});
+            } else {
+                batch.trace::<4>(&mut map, within, &|_| {});
+            }
+            first = first.saturating_add(count);
         }
-        let aimed = map.ledger.emitted().flux - before;
-        map.ledger.emit_unaimed(emitter.power() - aimed);
-        first += count;
     }
     Ok(map)
 }
@@ -77,59 +134,88 @@ pub struct PhotonTrail {
     pub ledger: EnergyLedger,
 }
 
-/// Follows one photon and all its branches, as [`trace_photons`] does for all: for hosts that emit
-/// photons of their own, and for comparing tracers photon by photon.
-///
-/// `media` are those around its start, `number` is its number among the photons of all lights, which
-/// chooses its random numbers. Of the options, those that concern emission are not used.
+/// Traces one photon of a plan, counted over all its batches in their order, and all its branches:
+/// what [`trace_part`] does for a range, with its paths. A number from [`EmissionPlan::count`] on has
+/// an empty trail.
 ///
 /// # Errors
 /// If the options are out of range.
-pub fn trace_photon<I: Intersect + ?Sized, const N: usize>(
+pub fn trace_photon<I: Intersect + ?Sized>(
     world: &World,
     intersect: &I,
+    plan: &EmissionPlan,
     options: &TraceOptions,
-    emission: &Emission<N>,
-    media: MediumStack,
-    number: u32,
+    photon: u32,
 ) -> Result<PhotonTrail, TraceError> {
     options.validate()?;
-    let mut tracer = PathTracer::<I, N>::new(world, intersect, options);
-    let mut rng = CounterRng::new(options.seed, u64::from(number));
-    tracer.trace(emission, media, &mut rng);
-    Ok(PhotonTrail {
-        photons: tracer.photons,
-        paths: tracer.paths,
-        ledger: tracer.ledger,
-    })
+    let mut index = photon;
+    for of_light in plan.lights() {
+        for (number, planned) in of_light.iter().enumerate() {
+            if index >= planned.count() {
+                index -= planned.count();
+                continue;
+            }
+            let batch = Batch {
+                world,
+                intersect,
+                options,
+                plan,
+                planned,
+                earlier: &of_light[..number],
+            };
+            return Ok(if planned.emitter().dimensions() == 2 {
+                batch.trail::<2>(index)
+            } else {
+                batch.trail::<4>(index)
+            });
+        }
+    }
+    Ok(PhotonTrail::default())
 }
 
-/// The photons of one emitter.
+/// The flux of all photons so far, that of directions which two pairs cover counted once.
+fn counted(map: &PhotonMap) -> DVec3 {
+    map.ledger.emitted().flux - map.ledger.entry(Fate::Overlap).flux
+}
+
+/// The photons of one emitter, and all that it takes to trace them.
 pub(crate) struct Batch<'a, I: ?Sized> {
     pub(crate) world: &'a World,
     pub(crate) intersect: &'a I,
     pub(crate) options: &'a TraceOptions,
-    pub(crate) emitter: &'a Emitter<'a>,
-    /// The media around the light.
-    pub(crate) media: MediumStack,
-    /// Number of its first photon among all.
-    pub(crate) first: u32,
-    pub(crate) count: u32,
+    pub(crate) plan: &'a EmissionPlan,
+    pub(crate) planned: &'a EmissionBatch,
+    /// Of the same light.
+    pub(crate) earlier: &'a [EmissionBatch],
 }
 
-impl<I: Intersect + ?Sized> Batch<'_, I> {
+impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     /// Whether its lattice is made finer where it must.
     fn is_refined(&self) -> bool {
         self.options.refinement.levels > 0
             && self.options.sequence == Sequence::Grid
-            && self.emitter.dimensions() == 2
-            && self.count > 0
+            && self.planned.emitter().dimensions() == 2
+            && self.planned.count() > 0
     }
 
-    fn trace<const N: usize>(&self, map: &mut PhotonMap, progress: &(dyn Fn(u32) + Sync)) {
-        let chunks = self.count.div_ceil(CHUNK);
+    /// A tracer for its photons.
+    pub(crate) fn tracer<const N: usize>(&self) -> PathTracer<'a, I, N> {
+        let caster = self.planned.emitter().caster();
+        PathTracer::new(self.world, self.intersect, self.options)
+            .aimed_at(caster.map(|it| (self.plan.casters(), it)), self.earlier)
+    }
+
+    /// Traces the photons with these numbers.
+    fn trace<const N: usize>(
+        &self,
+        map: &mut PhotonMap,
+        photons: std::ops::Range<u32>,
+        progress: &(dyn Fn(u32) + Sync),
+    ) {
+        let chunks = (photons.len() as u32).div_ceil(CHUNK);
         let run = |chunk: u32| {
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.count);
+            let start = photons.start + chunk * CHUNK;
+            let range = start..photons.end.min(start.saturating_add(CHUNK));
             let finished = range.len() as u32;
             let traced = self.trace_range::<N>(range);
             progress(finished);
@@ -152,19 +238,32 @@ impl<I: Intersect + ?Sized> Batch<'_, I> {
     }
 
     fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> PhotonMap {
-        let mut tracer = PathTracer::<I, N>::new(self.world, self.intersect, self.options);
-        let points = PointSet::new(self.options.sequence, self.count, self.options.seed);
+        let mut tracer = self.tracer::<N>();
         for index in range {
-            let sample = EmissionSample::of(&points, index);
-            let Some(emission) = self.emitter.emit::<N>(&sample) else {
-                continue;
-            };
-            let mut rng = CounterRng::new(self.options.seed, u64::from(self.first + index));
-            tracer.trace(&emission, self.media, &mut rng);
+            self.send(&mut tracer, index);
         }
         PhotonMap {
             photons: tracer.photons,
             ledger: tracer.ledger,
+        }
+    }
+
+    fn trail<const N: usize>(&self, index: u32) -> PhotonTrail {
+        let mut tracer = self.tracer::<N>();
+        self.send(&mut tracer, index);
+        PhotonTrail {
+            photons: tracer.photons,
+            paths: tracer.paths,
+            ledger: tracer.ledger,
+        }
+    }
+
+    fn send<const N: usize>(&self, tracer: &mut PathTracer<'_, I, N>, index: u32) {
+        let number = self.planned.point_number(index);
+        let sample = EmissionSample::of(self.planned.points(), number);
+        if let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) {
+            let mut rng = self.planned.random(self.options.seed, u64::from(number));
+            tracer.trace(&emission, self.planned.media(), &mut rng);
         }
     }
 }

@@ -5,6 +5,7 @@ use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
 
 use crate::area_emission::NARROWING;
+use crate::casters::Casters;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
 use crate::ledger::{EnergyLedger, Fate};
@@ -12,7 +13,9 @@ use crate::media::MediumStack;
 use crate::optics::beer_lambert;
 use crate::options::{Branching, TraceOptions};
 use crate::photon::Photon;
+use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
+use crate::trail::Trail;
 
 /// The longest change of direction, in radians for one sample spacing, that a differential keeps.
 /// Beyond it a first derivative says nothing about where the neighbour goes.
@@ -47,6 +50,12 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     /// one smooth sheet of light.
     pub(crate) paths: Vec<u32>,
     pub(crate) ledger: EnergyLedger,
+    /// What the photons are aimed at; `None` where all count.
+    caster: Option<(&'a Casters, u32)>,
+    /// The emitters of the same light whose photons come before these.
+    earlier: &'a [EmissionBatch],
+    /// Where the paths go, if that is asked for.
+    pub(crate) trail: Option<Trail<'a>>,
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
@@ -65,6 +74,24 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             photons: Vec::new(),
             paths: Vec::new(),
             ledger: EnergyLedger::default(),
+            caster: None,
+            earlier: &[],
+            trail: None,
+        }
+    }
+
+    /// With photons that count only if the first object in their way is of this caster. The
+    /// `earlier` emitters of the same light stand for what reaches no caster in directions that
+    /// they share.
+    pub(crate) fn aimed_at(
+        self,
+        caster: Option<(&'a Casters, u32)>,
+        earlier: &'a [EmissionBatch],
+    ) -> Self {
+        Self {
+            caster,
+            earlier,
+            ..self
         }
     }
 
@@ -100,8 +127,14 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             return;
         }
         self.ledger.rays += 1;
-        let Some(hit) = self.intersect.closest_hit(&branch.ray) else {
-            let fate = if branch.events == 0 {
+        let hit = self.intersect.closest_hit(&branch.ray);
+        if let Some(trail) = &mut self.trail {
+            trail.passes(self.world, &branch.ray, hit.as_ref());
+        }
+        let Some(hit) = hit else {
+            let fate = if branch.depth == 0 && self.is_overlap(&branch.ray, None) {
+                Fate::Overlap
+            } else if branch.events == 0 {
                 Fate::Missed
             } else {
                 Fate::Escaped
@@ -113,6 +146,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             self.ledger.book(Fate::Invalid, branch.flux);
             return;
         };
+        if branch.depth == 0 && self.is_overlap(&branch.ray, Some(point.object)) {
+            self.ledger.book(Fate::Overlap, branch.flux);
+            return;
+        }
         self.absorb(&mut branch, hit.t);
         branch.differential =
             branch
@@ -144,6 +181,18 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
                 }
                 Some(scattering) => self.branch_out(&part, &point, &scattering, threshold, rng),
             }
+        }
+    }
+
+    /// Whether another emitter of the same light stands for an emitted ray that first meets this
+    /// object, or nothing.
+    fn is_overlap(&self, ray: &Ray, object: Option<u32>) -> bool {
+        let Some((casters, caster)) = self.caster else {
+            return false;
+        };
+        match object.and_then(|object| casters.of_object(object)) {
+            Some(met) => met != caster,
+            None => self.earlier.iter().any(|it| it.covers(ray)),
         }
     }
 
@@ -257,9 +306,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             kept *= survival;
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
+        // By roots, which round alike on every machine, as powers do not.
+        let root = kept.sqrt();
         let differential = self
             .scattered(branch, point, outgoing)
-            .scaled(kept.powf(-1.0 / N as f32));
+            .scaled(1.0 / if N > 2 { root.sqrt() } else { root });
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let origin = point

@@ -5,7 +5,7 @@ mod common;
 use caustics_geometry::shapes::quad;
 use caustics_scene::{Light, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
-use caustics_trace::{Aim, EmissionSample, Emitter};
+use caustics_trace::{Aim, Casters, EmissionSample, Emitter};
 use common::relative_error;
 use common::scenes::{add_floor, add_mesh, add_sphere};
 use proptest::prelude::*;
@@ -63,7 +63,7 @@ proptest! {
     ) {
         const STEP: f32 = 4e-3;
         let world = world(Some(light));
-        let emitters = Emitter::all(&world, aim);
+        let emitters = Emitter::all(&world, &Casters::of(&world), aim);
         let point = Vec2::new(point.0, point.1);
         // Maps of the square have creases along its diagonals and the cross through its middle.
         let off = point - Vec2::splat(0.5);
@@ -72,7 +72,7 @@ proptest! {
         let spacing = [Vec2::new(edges[0], edges[1]), Vec2::new(edges[2], edges[3])];
         prop_assume!(spacing.iter().all(|edge| edge.length() > 0.1));
         let sample = EmissionSample { point, spacing, place: Vec2::splat(0.5), count: 1000 };
-        let at = |point: Vec2| emitters[0].emit::<2>(&EmissionSample { point, ..sample });
+        let at = |point: Vec2| emitters[0].emit::<2>(&world, &EmissionSample { point, ..sample });
         prop_assume!(at(point).is_some());
         let emission = at(point).expect("just checked");
         for (parameter, edge) in spacing.into_iter().enumerate() {
@@ -115,7 +115,7 @@ proptest! {
         rows in 2u32..50,
     ) {
         let world = world(Some(light));
-        let emitters = Emitter::all(&world, aim);
+        let emitters = Emitter::all(&world, &Casters::of(&world), aim);
         let edge = 1.0 / rows as f32;
         let sample = EmissionSample {
             point: Vec2::new(point.0, point.1),
@@ -123,7 +123,7 @@ proptest! {
             place: Vec2::splat(0.5),
             count: rows * rows,
         };
-        let emission = emitters[0].emit::<2>(&sample);
+        let emission = emitters[0].emit::<2>(&world, &sample);
         prop_assume!(emission.is_some());
         let emission = emission.expect("just checked");
         let differential = &emission.differential;
@@ -148,14 +148,14 @@ proptest! {
         aim in prop_oneof![Just(Aim::Everywhere), Just(Aim::Casters)],
     ) {
         let world = world(None);
-        let emitters = Emitter::all(&world, aim);
+        let emitters = Emitter::all(&world, &Casters::of(&world), aim);
         let sample = EmissionSample {
             point: Vec2::new(point.0, point.1),
             spacing: [Vec2::new(0.1, 0.0), Vec2::new(0.0, 0.1)],
             place: Vec2::new(place.0, place.1),
             count: 100,
         };
-        let emission = emitters[0].emit::<4>(&sample);
+        let emission = emitters[0].emit::<4>(&world, &sample);
         prop_assume!(emission.is_some());
         let RayChanges { moved, turned } = RayChanges::of(&emission.expect("just checked"));
         prop_assert_eq!((moved, turned), (2, 2));

@@ -45,6 +45,9 @@ enum Lamp {
     Spot,
     Sun,
     Panel,
+    Rectangle,
+    Disc,
+    Ball,
 }
 
 fn add_lamp(scene: &mut Scene, lamp: &Lamp, colour: [f32; 3]) {
@@ -53,6 +56,9 @@ fn add_lamp(scene: &mut Scene, lamp: &Lamp, colour: [f32; 3]) {
         Lamp::Point => Light::point(above, colour),
         Lamp::Spot => Light::spot(above, -above, colour, 0.2, 0.5),
         Lamp::Sun => Light::directional([0.2, -1.0, 0.1], colour),
+        Lamp::Rectangle => Light::rectangle(above, [Vec3::X, Vec3::Z], colour),
+        Lamp::Disc => Light::disc(above, -above, 0.6, colour),
+        Lamp::Ball => Light::sphere(above, 0.5, colour),
         Lamp::Panel => {
             let panel = quad(above, Vec3::X, Vec3::Z).expect("a valid panel");
             let material = Material::diffuse("panel", [0.0; 3]).with_emission(colour);
@@ -75,7 +81,15 @@ proptest! {
     fn what_comes_in_is_accounted_for(
         balls in prop::collection::vec(ball(), 1..6),
         lamps in prop::collection::vec(
-            prop_oneof![Just(Lamp::Point), Just(Lamp::Spot), Just(Lamp::Sun), Just(Lamp::Panel)],
+            prop_oneof![
+                Just(Lamp::Point),
+                Just(Lamp::Spot),
+                Just(Lamp::Sun),
+                Just(Lamp::Panel),
+                Just(Lamp::Rectangle),
+                Just(Lamp::Disc),
+                Just(Lamp::Ball),
+            ],
             1..3,
         ),
         colour in prop::array::uniform3(0.01f32..10.0),
@@ -107,6 +121,7 @@ proptest! {
                     let options = TraceOptions {
                         photons: 500, seed, max_depth, branching, min_weight, aim, sequence,
                         refinement: Refinement { levels: (seed % 3) as u32, ..Refinement::default() },
+                        ..TraceOptions::default()
                     };
                     let map = trace_photons(&world, &intersector, &options, &|_| {});
                     let map = map.expect("valid options");

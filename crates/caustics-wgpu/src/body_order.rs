@@ -1,5 +1,3 @@
-use std::ops::Range;
-
 use caustics_scene::{Surface, World};
 
 use crate::GpuError;
@@ -37,19 +35,6 @@ impl BodyOrder {
             bodies[object as usize] = body;
         }
         Ok(Self { objects, bodies })
-    }
-
-    /// Where an emissive object's cumulative areas lie among those of all.
-    pub(crate) fn cumulative_areas(world: &World, object: u32) -> Range<u32> {
-        let mut start = 0;
-        for light in world.emitters() {
-            let end = start + light.cumulative_area().len() as u32;
-            if light.object() == object {
-                return start..end;
-            }
-            start = end;
-        }
-        start..start
     }
 }
 

@@ -2,10 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 use caustics_scene::{Surface, World};
-use caustics_trace::{CHANNEL_WAVELENGTHS, dispersed_ior};
+use caustics_trace::{CHANNEL_WAVELENGTHS, Casters, dispersed_ior};
 
 use crate::GpuError;
 use crate::body_order::BodyOrder;
+use crate::trace_params::NO_CASTER;
 
 /// Set in the number of a primitive that is a sphere; the other bits are its body.
 pub(crate) const SPHERE_BIT: u32 = 1 << 31;
@@ -55,7 +56,7 @@ pub(crate) struct Body {
     pub(crate) object: u32,
     pub(crate) priority: i32,
     pub(crate) disperses: u32,
-    pub(crate) unused: u32,
+    pub(crate) caster: u32,
 }
 
 impl Body {
@@ -63,11 +64,12 @@ impl Body {
     pub(crate) const DIELECTRIC: u32 = 1;
     pub(crate) const METAL: u32 = 2;
 
-    fn of(world: &World, object: u32) -> Self {
+    fn of(world: &World, casters: &Casters, object: u32) -> Self {
         let described = &world.objects()[object as usize];
         let mut body = Self {
             object,
             kind: Self::RECEIVER,
+            caster: casters.of_object(object).unwrap_or(NO_CASTER),
             ..Self::default()
         };
         match world.materials()[described.material as usize].surface {
@@ -112,7 +114,6 @@ pub(crate) struct PackedScene {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) bodies: Vec<Body>,
-    pub(crate) cumulative_areas: Vec<f32>,
 }
 
 impl PackedScene {
@@ -123,16 +124,13 @@ impl PackedScene {
             let body = order.bodies[object as usize];
             Triangle { a, b, c, body }
         });
-        let bodies = order.objects.iter().map(|&object| Body::of(world, object));
-        let cumulative = world
-            .emitters()
-            .iter()
-            .flat_map(|light| light.cumulative_area());
+        let casters = Casters::of(world);
+        let bodies = order.objects.iter();
+        let bodies = bodies.map(|&object| Body::of(world, &casters, object));
         Ok(Self {
             vertices: vertices(world),
             triangles: triangles.collect(),
             bodies: bodies.collect(),
-            cumulative_areas: cumulative.copied().collect(),
         })
     }
 }

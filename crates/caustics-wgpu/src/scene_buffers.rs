@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use bytemuck::Pod;
 use caustics_scene::World;
 
@@ -19,9 +21,22 @@ pub struct SceneBuffers {
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) bodies: wgpu::Buffer,
-    pub(crate) cumulative_areas: wgpu::Buffer,
     pub(crate) root: u32,
+    /// Nodes by row, the leaves first; and where the rows lie in it.
+    pub(crate) refit_order: wgpu::Buffer,
+    pub(crate) rows: Vec<Range<u32>>,
+    /// By how much each leaf's box is wider than what it holds, in metres.
+    pub(crate) margin: f32,
+    pub(crate) counts: SceneCounts,
     bytes: u64,
+}
+
+/// How many elements the buffers were made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SceneCounts {
+    pub(crate) vertices: usize,
+    pub(crate) triangles: usize,
+    pub(crate) bodies: usize,
 }
 
 impl SceneBuffers {
@@ -39,17 +54,40 @@ impl SceneBuffers {
         let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
         let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
         let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
-        let areas = &packed.cumulative_areas;
-        let cumulative_areas = upload::<f32>(device, "cumulative areas", areas, &mut bytes)?;
+        let (order, rows) = hierarchy.refit_order();
+        let refit_order = upload::<u32>(device, "refit order", &order, &mut bytes)?;
         Ok(Self {
             nodes,
             vertices,
             triangles,
             bodies,
-            cumulative_areas,
             root: hierarchy.root(),
+            refit_order,
+            rows,
+            margin: hierarchy.margin,
+            counts: SceneCounts {
+                vertices: packed.vertices.len(),
+                triangles: packed.triangles.len(),
+                bodies: packed.bodies.len(),
+            },
             bytes,
         })
+    }
+
+    /// The vertices, 32 bytes each: position and unit normal as six floats, then eight bytes that
+    /// are not used. A host may write them, and then has to record
+    /// [`SceneRefit::fit`](crate::SceneRefit::fit).
+    #[must_use]
+    pub fn vertices(&self) -> &wgpu::Buffer {
+        &self.vertices
+    }
+
+    /// The nodes of the hierarchy, 32 bytes each: the lowest corner of the box as three floats; the
+    /// index of the left child, which the right one follows, or for a leaf its primitive; the
+    /// highest corner; and 1 for a leaf, else 0.
+    #[must_use]
+    pub fn nodes(&self) -> &wgpu::Buffer {
+        &self.nodes
     }
 
     /// Memory of the device that they occupy, in bytes.
@@ -75,7 +113,8 @@ fn upload<T: Pod>(
     } else {
         elements
     };
-    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    let copies = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+    let usage = wgpu::BufferUsages::STORAGE | copies;
     filled_buffer(device, what, usage, bytemuck::cast_slice(contents))
 }
 

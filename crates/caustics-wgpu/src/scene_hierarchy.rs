@@ -1,5 +1,7 @@
 //! The binary hierarchy that the shaders traverse.
 
+use std::ops::Range;
+
 use caustics_geometry::Aabb;
 use caustics_scene::World;
 use glam::{Vec3, Vec3A};
@@ -79,6 +81,21 @@ impl SceneHierarchy {
         }
     }
 
+    /// All nodes, so that children come before their parents, and the rows in which those lie that
+    /// can be fitted at once.
+    pub(crate) fn refit_order(&self) -> (Vec<u32>, Vec<Range<u32>>) {
+        let is_leaf = |&node: &u32| self.nodes[node as usize].is_leaf != 0;
+        let leaves: Vec<u32> = (0..self.nodes.len() as u32).filter(is_leaf).collect();
+        let mut order = Vec::with_capacity(self.nodes.len());
+        let mut rows = Vec::new();
+        for row in std::iter::once(&leaves).chain(&self.rows) {
+            let start = order.len() as u32;
+            order.extend_from_slice(row);
+            rows.push(start..order.len() as u32);
+        }
+        (order, rows)
+    }
+
     /// Computes all boxes.
     fn fit(&mut self, leaves: &[Leaf]) {
         for node in &mut self.nodes {
@@ -119,7 +136,6 @@ fn leaves(world: &World, order: &BodyOrder) -> Vec<Leaf> {
             primitive: SPHERE_BIT | order.bodies[object as usize],
         })
     });
-    let spheres: Vec<_> = spheres.collect::<Vec<_>>();
     triangles.chain(spheres).collect()
 }
 
@@ -195,4 +211,106 @@ fn rows(nodes: &[Node]) -> Vec<Vec<u32>> {
         rows[height - 1].push(index);
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use caustics_geometry::shapes::icosphere;
+    use caustics_scene::{Instance, Material, Scene, Shape};
+
+    /// A faceted ball, and exact ones in a row.
+    fn world(spheres: u32) -> World {
+        let mut scene = Scene::new();
+        let white = scene.add_material(Material::diffuse("", [0.5; 3])).unwrap();
+        let mesh = Shape::Mesh(scene.add_mesh(icosphere(1.0, 2).unwrap()));
+        let balls = (0..spheres).map(|place| Shape::Sphere {
+            center: Vec3::new(3.0 + 1.5 * place as f32, 0.0, 0.0),
+            radius: 0.5,
+        });
+        for shape in std::iter::once(mesh).chain(balls) {
+            scene.add_instance(Instance::new("", shape, white)).unwrap();
+        }
+        World::new(&scene).unwrap()
+    }
+
+    fn contains(outer: &Node, inner: &Node) -> bool {
+        (0..3)
+            .all(|axis| outer.low[axis] <= inner.low[axis] && inner.high[axis] <= outer.high[axis])
+    }
+
+    #[test]
+    fn every_primitive_is_in_one_leaf_and_all_boxes_above_it() {
+        let world = world(3);
+        let order = BodyOrder::new(&world).unwrap();
+        let tree = SceneHierarchy::new(&world, &order);
+        let mut found = Vec::new();
+        for node in &tree.nodes {
+            if node.is_leaf != 0 {
+                found.push(node.first);
+            } else {
+                for child in [node.first, node.first + 1] {
+                    assert!(contains(node, &tree.nodes[child as usize]));
+                }
+            }
+        }
+        found.sort_unstable();
+        let triangles = 0..world.triangles().len() as u32;
+        let expected = triangles.chain((1..4).map(|object| SPHERE_BIT | order.bodies[object]));
+        assert_eq!(found, expected.collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn rows_hold_every_node_after_its_children() {
+        let world = world(0);
+        let tree = SceneHierarchy::new(&world, &BodyOrder::new(&world).unwrap());
+        let (order, rows) = tree.refit_order();
+        let mut row_of = vec![None; tree.nodes.len()];
+        for (row, range) in rows.iter().enumerate() {
+            for &node in &order[range.start as usize..range.end as usize] {
+                assert_eq!(row_of[node as usize].replace(row), None);
+            }
+        }
+        for (node, row) in tree.nodes.iter().zip(&row_of) {
+            if node.is_leaf == 0 {
+                assert!(row_of[node.first as usize] < *row);
+                assert!(row_of[node.first as usize + 1] < *row);
+            }
+        }
+        assert!(row_of.iter().all(Option::is_some));
+        assert!((rows.len() as u32) < MAX_LEVELS);
+    }
+
+    #[test]
+    fn halving_is_no_deeper_than_the_logarithm() {
+        // All boxes alike: clusters could form a chain.
+        let bounds = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        let leaves: Vec<Leaf> = (0..1000)
+            .map(|primitive| Leaf { bounds, primitive })
+            .collect();
+        let nodes = halved(&leaves);
+        assert_eq!(nodes.len(), 2 * leaves.len() - 1);
+        assert_eq!(rows(&nodes).len(), 10);
+    }
+
+    #[test]
+    fn an_empty_world_has_no_root_and_one_primitive_has_a_leaf() {
+        let empty = World::new(&Scene::new()).unwrap();
+        let tree = SceneHierarchy::new(&empty, &BodyOrder::new(&empty).unwrap());
+        assert_eq!((tree.root(), tree.nodes.len()), (NO_PRIMITIVE, 0));
+        let mut scene = Scene::new();
+        let white = scene.add_material(Material::diffuse("", [0.5; 3])).unwrap();
+        let shape = Shape::Sphere {
+            center: Vec3::ZERO,
+            radius: 1.0,
+        };
+        scene.add_instance(Instance::new("", shape, white)).unwrap();
+        let one = World::new(&scene).unwrap();
+        let tree = SceneHierarchy::new(&one, &BodyOrder::new(&one).unwrap());
+        assert_eq!((tree.root(), tree.nodes.len()), (0, 1));
+        assert_eq!(
+            (tree.nodes[0].first, tree.nodes[0].is_leaf),
+            (SPHERE_BIT, 1)
+        );
+    }
 }

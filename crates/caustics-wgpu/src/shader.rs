@@ -59,6 +59,7 @@ pub(crate) mod reflection {
     use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
     use super::Shader;
+    use crate::pass_layout::Slot;
 
     /// Parses and validates, or says where in which piece it fails.
     pub(crate) fn validated(shader: &Shader) -> Result<(naga::Module, ModuleInfo), String> {
@@ -85,6 +86,51 @@ pub(crate) mod reflection {
             .iter()
             .map(|member| (member.name.clone().unwrap_or_default(), member.offset));
         (offsets.collect(), *span)
+    }
+
+    /// The value of a `const` of type u32.
+    pub(crate) fn constant(module: &naga::Module, name: &str) -> u32 {
+        let (_, found) = module
+            .constants
+            .iter()
+            .find(|(_, it)| it.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("the shader has no constant {name}"));
+        match module.global_expressions[found.init] {
+            naga::Expression::Literal(naga::Literal::U32(value)) => value,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    }
+
+    /// The workgroup's size along each axis.
+    pub(crate) fn workgroup_size(module: &naga::Module, entry_point: &str) -> [u32; 3] {
+        let mut all = module.entry_points.iter();
+        all.find(|it| it.name == entry_point)
+            .unwrap_or_else(|| panic!("the shader has no entry point {entry_point}"))
+            .workgroup_size
+    }
+
+    /// The slots that the shader's buffers are bound to, all of group 0, in order.
+    pub(crate) fn buffers(module: &naga::Module) -> Vec<(u32, Slot)> {
+        let mut found = Vec::new();
+        for (_, variable) in module.global_variables.iter() {
+            let Some(binding) = &variable.binding else {
+                continue;
+            };
+            assert_eq!(binding.group, 0, "{:?}", variable.name);
+            let slot = match variable.space {
+                naga::AddressSpace::Uniform => Slot::Uniform,
+                naga::AddressSpace::Storage { access }
+                    if access.contains(naga::StorageAccess::STORE) =>
+                {
+                    Slot::Write
+                }
+                naga::AddressSpace::Storage { .. } => Slot::Read,
+                other => panic!("{:?} is in {other:?}", variable.name),
+            };
+            found.push((binding.binding, slot));
+        }
+        found.sort_by_key(|(binding, _)| *binding);
+        found
     }
 }
 

@@ -18,30 +18,31 @@ pub struct TraceCounters {
 
 impl TraceCounters {
     /// Words of the buffer of counters. Mirrors `COUNTERS` in `shaders/ledger.wgsl`.
-    pub const WORDS: usize = 92;
+    pub const WORDS: usize = 98;
 
-    const STORED: usize = 0;
-    const LINES: usize = 2;
-    const RAYS: usize = 14;
-    const FALLBACKS: usize = 15;
-    const BOUNDED: usize = 16;
-    const SUMS: usize = 20;
+    pub(crate) const STORED: usize = 0;
+    pub(crate) const LINES: usize = 2;
+    pub(crate) const RAYS: usize = 15;
+    pub(crate) const FALLBACKS: usize = 16;
+    pub(crate) const BOUNDED: usize = 17;
+    pub(crate) const SUMS: usize = 20;
 
     /// The fates in the order of the shader's lines, which further ones follow.
-    const FATES: [Fate; 9] = [
+    pub(crate) const FATES: [Fate; 10] = [
         Fate::Stored,
         Fate::Absorbed,
         Fate::Escaped,
         Fate::Missed,
         Fate::Unaimed,
+        Fate::Overlap,
         Fate::Direct,
         Fate::TooDeep,
         Fate::Roulette,
         Fate::Invalid,
     ];
-    const CROWDED: usize = 9;
-    const EMITTED: usize = 10;
-    const ROULETTE_GAIN: usize = 11;
+    pub(crate) const CROWDED: usize = 10;
+    pub(crate) const EMITTED: usize = 11;
+    pub(crate) const ROULETTE_GAIN: usize = 12;
 
     /// Reads the words of [`PhotonBuffers::counters`](crate::PhotonBuffers::counters) after photons
     /// of `plan` were traced: all of them, or the light that its other photons carry counts as
@@ -74,7 +75,9 @@ impl TraceCounters {
         }
         let emitted = entry(Self::EMITTED);
         ledger.add_emitted(&emitted, entry(Self::ROULETTE_GAIN).flux);
-        ledger.emit_unaimed(plan.power() - emitted.flux);
+        // Light of directions that two emitters cover is emitted once.
+        let overlap = ledger.entry(Fate::Overlap).flux;
+        ledger.emit_unaimed(plan.power() - (emitted.flux - overlap));
         ledger.rays = u64::from(words[Self::RAYS]);
         ledger.normal_fallbacks = u64::from(words[Self::FALLBACKS]);
         ledger.bounded_differentials = u64::from(words[Self::BOUNDED]);

@@ -2,6 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// The number of no caster.
+pub(crate) const NO_CASTER: u32 = u32::MAX;
+
 /// Emitters that one dispatch can be told of.
 pub(crate) const MAX_EMITTERS: usize = 64;
 
@@ -11,7 +14,7 @@ pub(crate) struct Emitter {
     pub(crate) kind: u32,
     pub(crate) first: u32,
     pub(crate) count: u32,
-    pub(crate) rows: u32,
+    pub(crate) points: u32,
     pub(crate) place: [f32; 2],
     pub(crate) generator: u32,
     pub(crate) share: f32,
@@ -35,6 +38,18 @@ pub(crate) struct Emitter {
     pub(crate) first_cumulative: u32,
     pub(crate) media_count: u32,
     pub(crate) basis: [f32; 4],
+    pub(crate) rows: u32,
+    pub(crate) stream: u32,
+    pub(crate) caster: u32,
+    pub(crate) first_of_light: u32,
+    pub(crate) first_span: u32,
+    pub(crate) span_count: u32,
+    pub(crate) first_map: u32,
+    pub(crate) surface: u32,
+    pub(crate) radius: f32,
+    pub(crate) unused_a: u32,
+    pub(crate) unused_b: u32,
+    pub(crate) unused_c: u32,
 }
 
 impl Emitter {
@@ -42,6 +57,13 @@ impl Emitter {
     pub(crate) const CONE: u32 = 1;
     pub(crate) const RECTANGLE: u32 = 2;
     pub(crate) const AREA: u32 = 3;
+
+    pub(crate) const SURFACE_OBJECT: u32 = 0;
+    pub(crate) const SURFACE_RECTANGLE: u32 = 1;
+    pub(crate) const SURFACE_DISC: u32 = 2;
+    pub(crate) const SURFACE_CAP: u32 = 3;
+
+    pub(crate) const NO_MAP: u32 = u32::MAX;
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

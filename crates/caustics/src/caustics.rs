@@ -41,7 +41,7 @@ impl CausticsOptions {
     }
 
     /// With what the estimate decides.
-    fn settled(mut self) -> Self {
+    pub(crate) fn settled(mut self) -> Self {
         self.trace.sequence = self.estimate.sequence();
         if let Some(kernel) = self.estimate.kernel() {
             self.footprint.kernel = kernel;

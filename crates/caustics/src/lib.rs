@@ -63,6 +63,11 @@
 //! | [`filter`] | kernels, images and their files, error metrics |
 //! | [`glam`] | the vectors that cross the interface |
 //!
+//! # Frame by frame
+//!
+//! [`Progressive`] makes one picture better for as long as there is time. For scenes that move,
+//! [`LivePhotons`](trace::LivePhotons) keeps what a change does not reach.
+//!
 //! # Parts instead of the whole
 //!
 //! A host with a ray tracer of its own implements [`Intersect`](accel::Intersect) and calls
@@ -94,6 +99,7 @@
 
 mod caustics;
 mod error;
+mod progressive;
 
 pub use caustics_accel as accel;
 pub use caustics_filter as filter;
@@ -106,6 +112,7 @@ pub use glam;
 
 pub use crate::caustics::{Caustics, CausticsOptions, Progress, Stage, StageSeconds};
 pub use error::CausticsError;
+pub use progressive::{Progressive, Quantum};
 
 /// What most programs need.
 pub mod prelude {

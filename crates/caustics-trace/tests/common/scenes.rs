@@ -7,7 +7,7 @@ use caustics_sampling::{PointSet, Sequence};
 use caustics_scene::{Instance, Light, Material, Scene, SceneIntersector, Shape, World};
 use caustics_trace::glam::{Affine3A, Vec3};
 use caustics_trace::{
-    Aim, Branching, EmissionSample, Emitter, PhotonMap, TraceOptions, trace_photons,
+    Aim, Branching, Casters, EmissionSample, Emitter, PhotonMap, TraceOptions, trace_photons,
 };
 
 pub(crate) fn add_mesh(scene: &mut Scene, name: &str, mesh: TriangleMesh, material: Material) {
@@ -90,10 +90,10 @@ pub(crate) fn initial_turns(scene: &Scene, origin: Vec3, onwards: Vec3) -> [Vec3
         .add_light(single_ray(origin, onwards, SPACING))
         .expect("a valid light");
     let world = World::new(&scene).expect("a small world");
-    let emitters = Emitter::all(&world, Aim::Everywhere);
+    let emitters = Emitter::all(&world, &Casters::default(), Aim::Everywhere);
     let sample = EmissionSample::of(&PointSet::new(Sequence::Grid, 1, 0), 0);
     let emission = emitters[0]
-        .emit::<2>(&sample)
+        .emit::<2>(&world, &sample)
         .expect("the axis is in the cone");
     assert!((emission.ray.direction - onwards.normalize()).length() < 1e-6);
     emission.differential.direction

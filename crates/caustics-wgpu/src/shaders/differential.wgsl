@@ -27,6 +27,11 @@ fn transferred(
     return result;
 }
 
+// The matrix times the vector, summed in the twin's order.
+fn turned(matrix: mat3x3<f32>, v: vec3<f32>) -> vec3<f32> {
+    return matrix[0] * v.x + matrix[1] * v.y + matrix[2] * v.z;
+}
+
 // After mirror reflection; `turn` takes a displacement to the change of the normal.
 fn reflected(
     before: Differential,
@@ -38,7 +43,7 @@ fn reflected(
     let along = dot(direction, normal);
     for (var i = 0u; i < PARAMETERS; i++) {
         let change = before.direction[i];
-        let bend = turn * before.position[i];
+        let bend = turned(turn, before.position[i]);
         let along_change = dot(change, normal) + dot(direction, bend);
         result.direction[i] = change - 2.0 * (along * bend + along_change * normal);
     }
@@ -61,7 +66,7 @@ fn refracted(
     let mu_slope = eta - eta * eta * along / along_refracted;
     for (var i = 0u; i < PARAMETERS; i++) {
         let change = before.direction[i];
-        let bend = turn * before.position[i];
+        let bend = turned(turn, before.position[i]);
         let along_change = dot(change, normal) + dot(direction, bend);
         result.direction[i] = eta * change - (mu * bend + mu_slope * along_change * normal);
     }
@@ -81,13 +86,11 @@ fn bounded(before: Differential, limit: f32) -> Bounded {
         if !all_finite(change) {
             result.differential.direction[i] = vec3(0.0);
             result.shortened = true;
-        } else if size > 0.0 {
+        } else if size > limit || length_of(change) > limit {
+            // Scaled first: the square of a large derivative overflows.
             let scaled = change / size;
-            let length = length_of(scaled);
-            if length * size > limit {
-                result.differential.direction[i] = scaled * (limit / length);
-                result.shortened = true;
-            }
+            result.differential.direction[i] = scaled * (limit / length_of(scaled));
+            result.shortened = true;
         }
         if !all_finite(before.position[i]) {
             result.differential.position[i] = vec3(0.0);

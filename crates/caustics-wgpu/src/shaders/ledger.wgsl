@@ -9,27 +9,28 @@ const FATE_ABSORBED: u32 = 1u;
 const FATE_ESCAPED: u32 = 2u;
 const FATE_MISSED: u32 = 3u;
 const FATE_UNAIMED: u32 = 4u;
-const FATE_DIRECT: u32 = 5u;
-const FATE_TOO_DEEP: u32 = 6u;
-const FATE_ROULETTE: u32 = 7u;
-const FATE_INVALID: u32 = 8u;
+const FATE_OVERLAP: u32 = 5u;
+const FATE_DIRECT: u32 = 6u;
+const FATE_TOO_DEEP: u32 = 7u;
+const FATE_ROULETTE: u32 = 8u;
+const FATE_INVALID: u32 = 9u;
 // For want of room, in the buffer of records or for a photon's branches.
-const FATE_CROWDED: u32 = 9u;
+const FATE_CROWDED: u32 = 10u;
 // Not ends, but lines of the same form.
-const LINE_EMITTED: u32 = 10u;
-const LINE_ROULETTE_GAIN: u32 = 11u;
-const LINES: u32 = 12u;
+const LINE_EMITTED: u32 = 11u;
+const LINE_ROULETTE_GAIN: u32 = 12u;
+const LINES: u32 = 13u;
 
 // The words of the buffer: records stored, and parts lost because there was no room; then a count
 // for each line, then other counts, then sums by line, channel and word, the lower first.
 const COUNTER_STORED: u32 = 0u;
 const COUNTER_LOST: u32 = 1u;
 const COUNTER_LINES: u32 = 2u;
-const COUNTER_RAYS: u32 = 14u;
-const COUNTER_FALLBACKS: u32 = 15u;
-const COUNTER_BOUNDED: u32 = 16u;
+const COUNTER_RAYS: u32 = 15u;
+const COUNTER_FALLBACKS: u32 = 16u;
+const COUNTER_BOUNDED: u32 = 17u;
 const COUNTER_SUMS: u32 = 20u;
-const COUNTERS: u32 = 92u;
+const COUNTERS: u32 = 98u;
 
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 

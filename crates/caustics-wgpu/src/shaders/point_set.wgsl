@@ -60,7 +60,7 @@ fn lattice_place(multiple: u32, count: u32) -> f32 {
 }
 
 fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
-    let count = trace.emitters[emitter].count;
+    let count = trace.emitters[emitter].points;
     let place = trace.emitters[emitter].place;
     let edge = 1.0 / sqrt(f32(count));
     var result: EmissionSample;
@@ -95,4 +95,25 @@ fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
         result.place = vec2(sobol(index, 4u), sobol(index, 5u));
     }
     return result;
+}
+
+// The number, in the whole set, of the point of an emitter's photon. Twin: lattice.rs in
+// caustics-trace.
+fn point_number(emitter: u32, index: u32) -> u32 {
+    let first = trace.emitters[emitter].first_span;
+    var low = 0u;
+    var high = trace.emitters[emitter].span_count;
+    if high == 0u {
+        return index;
+    }
+    // The last run that does not begin after it.
+    while low + 1u < high {
+        let middle = (low + high) / 2u;
+        if emission_lists[first + 2u * middle + 1u] <= index {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return emission_lists[first + 2u * low] + (index - emission_lists[first + 2u * low + 1u]);
 }

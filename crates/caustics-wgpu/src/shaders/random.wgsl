@@ -30,9 +30,9 @@ fn unit_nearest(x: f32) -> f32 {
 var<private> random_key: vec4<u32>;
 var<private> random_counter: u32;
 
-// Starts the stream of a photon.
-fn random_start(photon: u32) {
-    random_key = pcg4d(vec4(trace.seed_low, trace.seed_high, photon, 0u));
+// Starts a stream of an emitter.
+fn random_start(point: u32, stream: u32) {
+    random_key = pcg4d(vec4(trace.seed_low, trace.seed_high, point, stream));
     random_counter = 0u;
 }
 

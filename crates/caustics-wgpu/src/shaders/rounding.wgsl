@@ -10,6 +10,10 @@ fn rounded(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ trace.zero);
 }
 
+fn rounded_vector(v: vec3<f32>) -> vec3<f32> {
+    return vec3(rounded(v.x), rounded(v.y), rounded(v.z));
+}
+
 // Twin: `gamma` in caustics-geometry's spawn.rs.
 fn gamma(roundings: f32) -> f32 {
     let error = roundings * UNIT_ROUNDOFF;

@@ -40,7 +40,8 @@ struct Body {
     object: u32,
     priority: i32,
     disperses: u32,
-    unused: u32,
+    // What it is a part of that lights aim at; `NO_CASTER` for receivers.
+    caster: u32,
 }
 
 const BODY_RECEIVER: u32 = 0u;
@@ -49,14 +50,3 @@ const BODY_METAL: u32 = 2u;
 
 // Set in the number of a primitive that is a sphere; the other bits are its body.
 const SPHERE_BIT: u32 = 0x80000000u;
-
-@group(0) @binding(1) var<storage, read> nodes: array<Node>;
-@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(0) @binding(3) var<storage, read> triangles: array<Triangle>;
-@group(0) @binding(4) var<storage, read> bodies: array<Body>;
-// For each emissive object, the fraction of its area up to and including each primitive.
-@group(0) @binding(5) var<storage, read> cumulative_areas: array<f32>;
-
-fn vertex_normal(vertex: u32) -> vec3<f32> {
-    return vec3(vertices[vertex].normal_x, vertices[vertex].normal_y, vertices[vertex].normal_z);
-}

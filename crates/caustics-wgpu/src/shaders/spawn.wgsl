@@ -27,10 +27,12 @@ fn spawn_on_triangle(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, u: f32, v: f32) -
     );
 }
 
-// The point of the sphere along the unit vector `outward`. The twin computes in f64; here the bound
-// covers the rounding of f32, in this point and in the next intersection with the same sphere.
-fn spawn_on_sphere(center: vec3<f32>, radius: f32, outward: vec3<f32>) -> SpawnPoint {
-    return SpawnPoint(center + radius * outward, gamma(16.0) * (abs(center) + radius));
+// The point of the sphere nearest to `point`.
+fn spawn_on_sphere(center: vec3<f32>, radius: f32, point: vec3<f32>) -> SpawnPoint {
+    let outward = from_sphere_center(point, center);
+    let position = single_vector(
+        double_vector_sum(double_vector(center), double_scaled(outward, double_of(radius))));
+    return SpawnPoint(position, gamma(2.0) * abs(position));
 }
 
 fn origin_towards(spawn: SpawnPoint, geometric_normal: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {

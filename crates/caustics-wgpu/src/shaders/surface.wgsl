@@ -65,9 +65,9 @@ fn surface_at(ray: Ray, hit: Hit) -> SurfacePoint {
     if (hit.primitive & SPHERE_BIT) != 0u {
         point.body = hit.primitive ^ SPHERE_BIT;
         let center = bodies[point.body].center;
-        let outward = ray.origin + hit.t * ray.direction - center;
-        let normal = normalized(outward);
-        point.spawn = spawn_on_sphere(center, bodies[point.body].radius, normal);
+        let met = ray.origin + hit.t * ray.direction;
+        point.spawn = spawn_on_sphere(center, bodies[point.body].radius, met);
+        let normal = single_vector(from_sphere_center(point.spawn.position, center));
         point.geometric_normal = normal;
         point.shading_normal = normal;
     } else {
@@ -138,7 +138,9 @@ fn point_on(primitive: u32, along: f32, across: f32) -> PointOn {
         let ring = sqrt(max(1.0 - height * height, 0.0));
         let angle = sine_cosine(2.0 * PI * across);
         let normal = vec3(ring * angle.y, height, ring * angle.x);
-        let spawn = spawn_on_sphere(bodies[body].center, bodies[body].radius, normal);
+        let center = bodies[body].center;
+        let radius = bodies[body].radius;
+        let spawn = spawn_on_sphere(center, radius, center + radius * normal);
         return PointOn(spawn, normal, true);
     }
     let triangle = corners_of(primitive);

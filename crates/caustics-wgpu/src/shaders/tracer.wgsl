@@ -1,7 +1,9 @@
 // From light to receiver. Twins: tracer.rs and trace.rs in caustics-trace.
 
-// Branches of one photon that wait; beyond it their light is booked as crowded.
-const MAX_PENDING: u32 = 24u;
+// Branches of one photon that wait. Where no more than a few have room left, photons go one way, as
+// with `BRANCHING_ROULETTE`; what finds no room even so is booked as crowded.
+const MAX_PENDING: u32 = 28u;
+const RESERVED_PENDING: u32 = 4u;
 
 // The longest change of direction that a differential keeps. Twin: `DIRECTION_CHANGE_LIMIT`.
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
@@ -29,6 +31,7 @@ var<private> pending_count: u32;
 // Flux below which roulette begins.
 var<private> threshold: f32;
 var<private> photon_number: u32;
+var<private> photon_emitter: u32;
 
 fn extended(path: u32, object: u32, event: u32) -> u32 {
     let word = object * 4u + event + 0x9e3779b9u;
@@ -138,8 +141,10 @@ fn branch_out(branch_given: Branch, point: SurfacePoint) {
         book(FATE_ABSORBED, branch_given.flux * scattering.absorbed);
     }
     let both = scattering.count == 2u;
-    let splits = trace.branching == BRANCHING_SPLIT_ALL
+    let has_room = pending_count + RESERVED_PENDING <= MAX_PENDING;
+    let may_split = trace.branching == BRANCHING_SPLIT_ALL
         || (trace.branching == BRANCHING_SPLIT_FIRST && !branch_given.has_split);
+    let splits = may_split && has_room;
     var branch = branch_given;
     branch.has_split = branch_given.has_split || (both && splits);
     let side = select(-1.0, 1.0, point.from_outside);
@@ -167,13 +172,22 @@ fn advance(branch_given: Branch) {
     }
     count_up(COUNTER_RAYS, 1u);
     let hit = closest_hit(branch.ray);
-    if hit.primitive == NO_PRIMITIVE {
-        book(select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u), branch.flux);
+    let misses = hit.primitive == NO_PRIMITIVE;
+    var point: SurfacePoint;
+    point.body = NO_BODY;
+    if !misses {
+        point = surface_at(branch.ray, hit);
+        if !point.is_valid {
+            book(FATE_INVALID, branch.flux);
+            return;
+        }
+    }
+    if branch.depth == 0u && is_overlap(photon_emitter, branch.ray, point.body) {
+        book(FATE_OVERLAP, branch.flux);
         return;
     }
-    let point = surface_at(branch.ray, hit);
-    if !point.is_valid {
-        book(FATE_INVALID, branch.flux);
+    if misses {
+        book(select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u), branch.flux);
         return;
     }
     let medium = current_medium(branch.media);
@@ -215,10 +229,12 @@ fn trace_photon(number: u32) {
         emitter += 1u;
     }
     photon_number = number;
-    random_start(number);
+    photon_emitter = emitter;
     last_record = 0u;
     pending_count = 0u;
-    let emission = emit(emitter, number - trace.emitters[emitter].first);
+    let point = point_number(emitter, number - trace.emitters[emitter].first);
+    random_start(point, trace.emitters[emitter].stream);
+    let emission = emit(emitter, point);
     if emission.is_valid {
         book(LINE_EMITTED, emission.flux);
         threshold = trace.min_weight * largest(emission.flux);

@@ -18,15 +18,17 @@ struct DiscSample {
     d_dv: vec2<f32>,
 }
 
-// Sine and cosine of an angle from -4 to 8, to f32's accuracy, which WGSL's own do not promise: by
-// Taylor's series within an eighth of a turn.
+// Sine and cosine of an angle from -8 to 8, to f32's accuracy, which WGSL's own do not promise. Twin:
+// sine_cosine.rs.
 fn sine_cosine(angle: f32) -> vec2<f32> {
-    let quarters = round(angle * (1.0 / HALF_PI));
+    let quarters = round(angle * 0.636619772);
     // A quarter turn in two parts, the first of few digits.
-    let x = (angle - quarters * 1.5703125) - quarters * 4.83826794897e-4;
+    let x = (angle - quarters * 1.5703125) - quarters * 4.838268e-4;
     let y = x * x;
-    let sine = x + x * y * (-1.6666667e-1 + y * (8.3333333e-3 + y * (-1.9841270e-4 + y * 2.7557319e-6)));
-    let cosine = 1.0 + y * (-0.5 + y * (4.1666667e-2 + y * (-1.3888889e-3 + y * (2.4801587e-5 - y * 2.7557319e-7))));
+    let sine_tail = -1.984127e-4 + y * 2.755732e-6;
+    let sine = x + x * y * (-1.6666667e-1 + y * (8.333334e-3 + y * sine_tail));
+    let cosine_tail = -1.3888889e-3 + y * (2.4801587e-5 - y * 2.755732e-7);
+    let cosine = 1.0 + y * (-0.5 + y * (4.1666668e-2 + y * cosine_tail));
     switch i32(quarters) & 3 {
         case 1: { return vec2(cosine, -sine); }
         case 2: { return vec2(-sine, -cosine); }
@@ -96,11 +98,32 @@ fn square_to_sphere_octahedral(uv: vec2<f32>) -> DirectionSample {
     let d_radius = up * (2.0 - 2.0 * r * r) / stretch;
     let turn = select(parts, parts.yx, above);
     let d_z = -2.0 * r;
-    let across_u = side * (d_radius * radial - stretch * HALF_PI * turn.x * tangential);
-    let across_v = side * (d_radius * radial + stretch * HALF_PI * turn.y * tangential);
+    let across_u = side * (d_radius * radial + stretch * (-HALF_PI * turn.x) * tangential);
+    let across_v = side * (d_radius * radial + stretch * (HALF_PI * turn.y) * tangential);
     return DirectionSample(
         vec3(side * radius * radial, up * (1.0 - r * r)),
         2.0 * side.x * vec3(across_u, d_z),
         2.0 * side.y * vec3(across_v, d_z),
+    );
+}
+
+// Twin: cosine_hemisphere.rs.
+fn square_to_cosine_hemisphere(uv: vec2<f32>) -> DirectionSample {
+    let disc = square_to_disc_concentric(uv);
+    let squared = max(1.0 - dot(disc.value, disc.value), 0.0);
+    let near = sqrt(max(squared, 4.0 * POLE_DISTANCE));
+    return DirectionSample(
+        vec3(disc.value, sqrt(squared)),
+        vec3(disc.d_du, -dot(disc.value, disc.d_du) / near),
+        vec3(disc.d_dv, -dot(disc.value, disc.d_dv) / near),
+    );
+}
+
+// A sample of directions in a frame, turned to the world's axes.
+fn sample_from_frame(tangents: Tangents, normal: vec3<f32>, local: DirectionSample) -> DirectionSample {
+    return DirectionSample(
+        from_frame(tangents, normal, local.value),
+        from_frame(tangents, normal, local.d_du),
+        from_frame(tangents, normal, local.d_dv),
     );
 }

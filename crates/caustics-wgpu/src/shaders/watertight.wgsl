@@ -1,10 +1,8 @@
-// The watertight triangle test of Woop, Benthin and Wald 2013. Twin: watertight.rs in
-// caustics-geometry.
+// The watertight triangle test of Woop, Benthin and Wald 2013. Twin: leaf_test.rs in caustics-accel.
 //
 // A product that is rounded by itself keeps the guarantee that a ray through a shared edge hits one
-// of its triangles; see rounding.wgsl. Where all edge functions vanish the twin computes in f64.
-// Here they are computed again in coordinates scaled to 1, which is enough where the triangle was
-// too small for f32; one seen edge-on is left to its neighbours.
+// of its triangles; see rounding.wgsl. Where all edge functions vanish, they are computed again, in
+// 48 bits and in coordinates scaled to 1, as the twin does in f64.
 
 struct ShearedRay {
     origin: vec3<f32>,
@@ -25,12 +23,8 @@ fn to_z(p: vec3<f32>, axis: u32) -> vec3<f32> {
 
 fn sheared_ray(ray: Ray) -> ShearedRay {
     let size = abs(ray.direction);
-    var axis = 2u;
-    if size.x > size.y && size.x > size.z {
-        axis = 0u;
-    } else if size.y > size.z {
-        axis = 1u;
-    }
+    var axis = select(0u, 1u, size.y > size.x);
+    axis = select(axis, 2u, size.z > max(size.x, size.y));
     let direction = to_z(ray.direction, axis);
     let shear = vec3(direction.x / direction.z, direction.y / direction.z, 1.0 / direction.z);
     return ShearedRay(ray.origin, shear, axis);
@@ -43,6 +37,10 @@ fn sheared(ray: ShearedRay, vertex: vec3<f32>) -> vec3<f32> {
 
 fn edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
     return rounded(p.x * q.y) - rounded(p.y * q.x);
+}
+
+fn exact_edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
+    return double_sum(exact_product(p.x, q.y), double_negated(exact_product(p.y, q.x))).high;
 }
 
 // Where the ray meets the triangle, with `t` not above 0 where it does not.
@@ -70,10 +68,13 @@ fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c
             return missed;
         }
         let scale = 1.0 / size;
+        a = vec3(scale * a.xy, a.z);
+        b = vec3(scale * b.xy, b.z);
+        c = vec3(scale * c.xy, c.z);
         weights = vec3(
-            edge_function(scale * c.xy, scale * b.xy),
-            edge_function(scale * a.xy, scale * c.xy),
-            edge_function(scale * b.xy, scale * a.xy),
+            exact_edge_function(c.xy, b.xy),
+            exact_edge_function(a.xy, c.xy),
+            exact_edge_function(b.xy, a.xy),
         );
         sum = weights.x + weights.y + weights.z;
         let crosses = any(weights < vec3(0.0)) && any(weights > vec3(0.0));
@@ -81,9 +82,6 @@ fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c
             return missed;
         }
     }
-    let inverse = 1.0 / sum;
-    let u = weights.y * inverse;
-    let v = weights.z * inverse;
-    let along = weights.x * inverse * depth.x + u * depth.y + v * depth.z;
-    return vec3(along * ray.shear.z, u, v);
+    let along = weights.x * depth.x + weights.y * depth.y + weights.z * depth.z;
+    return vec3(along * ray.shear.z / sum, weights.y / sum, weights.z / sum);
 }

@@ -1,6 +1,11 @@
 //! What the tests of this crate share.
 #![allow(dead_code, reason = "each test file takes what it needs")]
 
+pub mod scenes;
+pub mod tracing;
+
+use std::sync::OnceLock;
+
 use caustics_wgpu::wgpu;
 
 /// A device of an adapter of this machine, with no more than WebGPU's default limits.
@@ -11,7 +16,15 @@ use caustics_wgpu::wgpu;
 /// # Panics
 /// Without an adapter where `CI` is set.
 pub fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
-    let device = pollster::block_on(device());
+    limited_device(wgpu::Limits::default())
+}
+
+/// As [`test_device`], with other limits.
+///
+/// # Panics
+/// Without an adapter where `CI` is set.
+pub fn limited_device(limits: wgpu::Limits) -> Option<(wgpu::Device, wgpu::Queue)> {
+    let device = pollster::block_on(device(limits));
     if let Err(error) = &device {
         assert!(std::env::var_os("CI").is_none(), "no GPU adapter: {error}");
         println!("skipped: no GPU adapter: {error}");
@@ -19,7 +32,19 @@ pub fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
     device.ok()
 }
 
-async fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn std::error::Error>> {
+/// The device that the tests of one file share, as [`test_device`] gives it: the shaders of the
+/// software adapter take seconds to compile.
+///
+/// # Panics
+/// Without an adapter where `CI` is set.
+pub fn shared_device() -> Option<&'static (wgpu::Device, wgpu::Queue)> {
+    static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
+    DEVICE.get_or_init(test_device).as_ref()
+}
+
+async fn device(
+    limits: wgpu::Limits,
+) -> Result<(wgpu::Device, wgpu::Queue), Box<dyn std::error::Error>> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::VULKAN,
         ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -29,7 +54,7 @@ async fn device() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn std::error::Err
         .await?;
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("test"),
-        required_limits: wgpu::Limits::default(),
+        required_limits: limits,
         ..wgpu::DeviceDescriptor::default()
     };
     Ok(adapter.request_device(&descriptor).await?)

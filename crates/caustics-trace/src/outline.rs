@@ -1,4 +1,6 @@
-use caustics_geometry::Sphere;
+use std::f32::consts::PI;
+
+use caustics_geometry::{Aabb, Sphere};
 use caustics_sampling::warp::Cone;
 use caustics_scene::World;
 use glam::{Vec2, Vec3};
@@ -19,40 +21,38 @@ const MIN_CONE_COSINE: f32 = 0.05;
 /// By how much an aimed domain is wider than what it holds, so that rounding cuts nothing off.
 const MARGIN: f32 = 1e-4;
 
-/// The specular objects of a world, as what bounds them: vertices and spheres.
+/// Some objects of a world, as what bounds them: vertices and spheres.
 #[derive(Clone, Debug)]
-pub(crate) struct Casters {
+pub(crate) struct Outline {
     vertices: Vec<Vec3>,
     spheres: Vec<Sphere>,
     bounding: Sphere,
 }
 
-impl Casters {
-    /// `None` where nothing is specular.
-    pub(crate) fn of(world: &World) -> Option<Self> {
-        let mut vertices = Vec::new();
+impl Outline {
+    /// The outline of the objects with these indices; `None` where they have no surface.
+    pub(crate) fn of(world: &World, objects: &[u32]) -> Option<Self> {
         let mut spheres = Vec::new();
-        let mut is_used = vec![false; world.positions().len()];
-        for object in world.objects() {
-            if !world.materials()[object.material as usize]
-                .surface
-                .is_specular()
-            {
-                continue;
-            }
+        let mut used: Vec<u32> = Vec::new();
+        let mut bounds = Aabb::EMPTY;
+        for &object in objects {
+            let object = &world.objects()[object as usize];
             let triangles = object.triangles.start as usize..object.triangles.end as usize;
-            for &vertex in world.triangles()[triangles].as_flattened() {
-                if !std::mem::replace(&mut is_used[vertex as usize], true) {
-                    vertices.push(world.positions()[vertex as usize]);
-                }
-            }
+            used.extend(world.triangles()[triangles].as_flattened());
             let range = object.spheres.start as usize..object.spheres.end as usize;
             spheres.extend_from_slice(&world.spheres()[range]);
+            bounds = bounds.union(&object.bounds);
         }
+        used.sort_unstable();
+        used.dedup();
+        let vertices: Vec<Vec3> = used
+            .into_iter()
+            .map(|vertex| world.positions()[vertex as usize])
+            .collect();
         if vertices.is_empty() && spheres.is_empty() {
             return None;
         }
-        let center = world.specular_bounds().center();
+        let center = bounds.center();
         let reach = |point: &Vec3| point.distance(center);
         let farthest = vertices.iter().map(reach).fold(0.0, f32::max);
         let radius = spheres
@@ -137,6 +137,36 @@ impl Casters {
         (back(low), [back(Vec2::X) * size.x, back(Vec2::Y) * size.y])
     }
 
+    /// Whether everything lies in a cone from `origin`.
+    pub(crate) fn is_in_cone(&self, origin: Vec3, axis: Vec3, cone: Cone) -> bool {
+        let angle = half_angle(cone) * (1.0 - MARGIN);
+        let chord = 2.0 * (0.5 * angle).sin();
+        self.vertices.iter().all(|vertex| {
+            (vertex - origin)
+                .try_normalize()
+                .is_some_and(|direction| direction.distance_squared(axis) < chord * chord)
+        }) && self.spheres.iter().all(|sphere| {
+            let to_center = sphere.center - origin;
+            let distance = to_center.length();
+            distance > sphere.radius
+                && to_center.angle_between(axis) + (sphere.radius / distance).asin() < angle
+        })
+    }
+
+    /// Whether everything lies before a rectangle, seen along its normal.
+    pub(crate) fn is_in_rectangle(&self, corner: Vec3, edges: &[Vec3; 2]) -> bool {
+        edges.iter().all(|&edge| {
+            let length = edge.length();
+            let range = 0.0..=length;
+            let along = |point: Vec3| (point - corner).dot(edge) / length;
+            self.vertices.iter().all(|&it| range.contains(&along(it)))
+                && self.spheres.iter().all(|sphere| {
+                    let center = along(sphere.center);
+                    center >= sphere.radius && center + sphere.radius <= length
+                })
+        })
+    }
+
     /// Some of the vertices, and the outermost points of the spheres.
     fn sampled(&self) -> impl Iterator<Item = Vec3> {
         let stride = self.vertices.len().div_ceil(SHAPE_VERTICES).max(1);
@@ -154,6 +184,12 @@ impl Casters {
             .flat_map(move |sphere| poles.map(|pole| sphere.center + sphere.radius * pole));
         self.vertices.iter().step_by(stride).copied().chain(around)
     }
+}
+
+/// The half angle of a cone in radians, with all its digits where it is narrow.
+pub(crate) fn half_angle(cone: Cone) -> f32 {
+    // 1 - cos a = 2 sin² (a / 2), and the solid angle is 2 pi of it.
+    2.0 * (cone.solid_angle() / (4.0 * PI)).sqrt().min(1.0).asin()
 }
 
 /// The box around points in a frame turned by `turn` radians.

@@ -1,0 +1,165 @@
+use caustics_sampling::{Grid, PointSet, Sequence};
+
+use crate::emission::EmissionSample;
+use crate::projection_map::ProjectionMap;
+
+/// How often the number of points is corrected to that of the marked ones.
+const CORRECTIONS: u32 = 12;
+
+/// The points that an emitter's photons are made from: a whole set or, with a projection map, those
+/// of its points that lie in marked cells.
+///
+/// Leaving points out moves none of the others, so that the photons that are traced stand as
+/// regularly as those of the whole set, and each has the share that it would have there.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Lattice {
+    points: PointSet,
+    /// Runs of consecutive points that are used; `None` for all.
+    spans: Option<Vec<Span>>,
+    count: u32,
+}
+
+/// A run of consecutive points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Span {
+    /// Number of its first point in the set.
+    first: u32,
+    /// Used points before it.
+    before: u32,
+}
+
+impl Lattice {
+    /// All of `count` points.
+    pub(crate) fn whole(sequence: Sequence, count: u32, seed: u64) -> Self {
+        Self {
+            points: PointSet::new(sequence, count, seed),
+            spans: None,
+            count,
+        }
+    }
+
+    /// The points in marked cells of as large a set as has at most `budget` of them.
+    pub(crate) fn marked(sequence: Sequence, budget: u32, seed: u64, map: &ProjectionMap) -> Self {
+        let coverage = f64::from(map.coverage());
+        let mut best: Option<Self> = None;
+        let mut size = f64::from(budget) / coverage;
+        for _ in 0..CORRECTIONS {
+            if !(1.0..=f64::from(u32::MAX)).contains(&size) {
+                break;
+            }
+            let lattice = Self::within(PointSet::new(sequence, size as u32, seed), map);
+            let found = f64::from(lattice.count);
+            if lattice.count <= budget {
+                if best.as_ref().is_none_or(|it| lattice.count > it.count) {
+                    best = Some(lattice);
+                }
+                if found >= f64::from(budget) {
+                    break;
+                }
+            }
+            let missing = f64::from(budget) - found;
+            // Towards the budget, and on past it by less each time.
+            size += (missing / coverage).clamp(-0.5 * size, size).trunc()
+                + if missing < 0.0 { -1.0 } else { 1.0 };
+        }
+        best.unwrap_or_else(|| Self::whole(sequence, budget, seed))
+    }
+
+    /// The points of a set that lie in marked cells.
+    pub(crate) fn within(points: PointSet, map: &ProjectionMap) -> Self {
+        let mut spans = Vec::new();
+        let mut count = 0;
+        let mut add = |first: u32, length: u32| {
+            if length > 0 {
+                let before = count;
+                spans.push(Span { first, before });
+                count += length;
+            }
+        };
+        if points.sequence() == Sequence::Grid {
+            for_each_row(&points, |first, columns| {
+                let row = (points.point(first).y * ProjectionMap::RESOLUTION as f32) as u32;
+                let column_at = |cell: u32| {
+                    let edge = cell as f32 / ProjectionMap::RESOLUTION as f32;
+                    partition_point(columns, |column| points.point(first + column).x < edge)
+                };
+                for run in map.runs(row) {
+                    let (start, end) = (column_at(run.start), column_at(run.end));
+                    add(first + start, end - start);
+                }
+            });
+        } else {
+            for index in 0..points.count() {
+                if map.contains(points.point(index)) {
+                    add(index, 1);
+                }
+            }
+        }
+        Self {
+            points,
+            spans: Some(spans),
+            count,
+        }
+    }
+
+    /// Number of points that are used.
+    pub(crate) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The whole set.
+    pub(crate) fn points(&self) -> &PointSet {
+        &self.points
+    }
+
+    /// The runs of consecutive points that are used, each as the number of its first point in the set
+    /// and of the used points before it; `None` where all are.
+    pub(crate) fn spans(&self) -> Option<impl Iterator<Item = (u32, u32)>> {
+        let spans = self.spans.as_ref()?;
+        Some(spans.iter().map(|span| (span.first, span.before)))
+    }
+
+    /// The number in the whole set of used point `index`.
+    pub(crate) fn number(&self, index: u32) -> u32 {
+        match &self.spans {
+            None => index,
+            Some(spans) => {
+                let span = spans.partition_point(|it| it.before <= index);
+                match span.checked_sub(1).and_then(|it| spans.get(it)) {
+                    Some(span) => span.first + (index - span.before),
+                    None => index,
+                }
+            }
+        }
+    }
+
+    /// The sample of used point `index`.
+    pub(crate) fn sample(&self, index: u32) -> EmissionSample {
+        EmissionSample::of(&self.points, self.number(index))
+    }
+}
+
+/// Calls `visit` with the first point and the number of points of each row of a grid.
+fn for_each_row(points: &PointSet, mut visit: impl FnMut(u32, u32)) {
+    let grid = Grid::new(points.count());
+    let mut first = 0;
+    for row in 0..grid.rows() {
+        let columns = grid.columns(row);
+        visit(first, columns);
+        first += columns;
+    }
+}
+
+/// How many of `0..count` come before the first for which `is_before` does not hold.
+fn partition_point(count: u32, is_before: impl Fn(u32) -> bool) -> u32 {
+    let (mut low, mut high) = (0, count);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if is_before(middle) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
