@@ -1,5 +1,9 @@
 //! What the tests of this crate share.
 #![allow(dead_code, reason = "each test file takes what it needs")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot be set up has failed"
+)]
 
 pub mod scenes;
 pub mod tracing;
