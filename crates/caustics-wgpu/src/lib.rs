@@ -101,7 +101,7 @@
 //!
 //! A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one
 //! batch fit one binding, 1.6 million in 128 MiB; more are several batches. A view takes about 70
-//! bytes a pixel, in half floats and four layers 130. On a browser's device, errors arrive after the
+//! bytes a pixel, in half floats and eight layers 200. On a browser's device, errors arrive after the
 //! call that caused them, and go to the host's handlers.
 //!
 //! # Sources
