@@ -23,12 +23,91 @@
 //! assert_eq!(size_of_val(&record), 80);
 //! ```
 //!
+//! # A frame
+//!
+//! Start with [`CausticsRenderer`]. It needs WebGPU's default limits and no feature; it makes use of
+//! [more](CausticsRenderer::used_features) where the host asks for it, and says what it chose in
+//! [`Capabilities`].
+//!
+//! ```no_run
+//! use caustics_wgpu::{
+//!     CausticsRenderer, CompositeTarget, FrameLight, FrameParams, RendererOptions, SceneBuffers,
+//!     SurfaceInput, TracePlan, ViewParams, wgpu,
+//! };
+//! # fn host(device: &wgpu::Device, queue: &wgpu::Queue, depth: &wgpu::TextureView,
+//! #     normals: &wgpu::TextureView, albedo: &wgpu::TextureView, lit: &wgpu::TextureView,
+//! #     scene: &caustics_scene::Scene, matrix: [[f32; 4]; 4],
+//! # ) -> Result<(), Box<dyn std::error::Error>> {
+//! // Once.
+//! let target = CompositeTarget::new(wgpu::TextureFormat::Rgba16Float);
+//! let options = RendererOptions { targets: vec![target], ..RendererOptions::default() };
+//! let mut caustics = CausticsRenderer::new(device, &options)?;
+//! let world = caustics_scene::World::new(scene)?;
+//! let rays = world.intersector(&caustics_scene::BvhOptions::default())?;
+//! let buffers = SceneBuffers::new(device, &world)?;
+//! let plan = TracePlan::new(&world, &rays, &caustics_trace::TraceOptions::default())?;
+//!
+//! // Each frame, after the host's depth and normals are drawn, in the host's encoder.
+//! let mut encoder = device.create_command_encoder(&Default::default());
+//! let view = ViewParams {
+//!     albedo: Some(albedo),
+//!     ..ViewParams::new([1280, 720], matrix, SurfaceInput::Depth(depth), normals)
+//! };
+//! let light = FrameLight::Traced { scene: &buffers, plan: &plan };
+//! let frame = FrameParams { light, views: &[view] };
+//! let prepared = caustics.prepare(device, queue, &mut encoder, &frame)?;
+//!
+//! // In the host's own pass, after its opaque surfaces are lit.
+//! let attachment = wgpu::RenderPassColorAttachment {
+//!     view: lit,
+//!     depth_slice: None,
+//!     resolve_target: None,
+//!     ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+//! };
+//! let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+//!     color_attachments: &[Some(attachment)],
+//!     ..Default::default()
+//! });
+//! caustics.draw(&mut pass, &prepared, 0, &target)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # What is where
 //!
 //! | to | take |
 //! | --- | --- |
+//! | have caustics in a frame | [`CausticsRenderer`], [`RendererOptions`], [`FrameParams`], [`ViewParams`] |
+//! | say where light comes from | [`FrameLight`]; [`SceneBuffers`] and [`TracePlan`], or [`FootprintBatch`]es |
+//! | choose how footprints become pixels | [`SplatOptions`], [`SplatMethod`], [`SplatKernel`] |
+//! | know the light at any point, in a shader of one's own or from a buffer | [`Gather`] |
+//! | trace photons alone | [`PhotonTracer`], [`PhotonBuffers`], [`TraceCounters`] |
 //! | keep a photon where both sides can read it | [`FootprintRecord`] |
-//! | know what went wrong | [`GpuError`] |
+//! | know what became of footprints, and how long passes took | [`PreparedFrame`], [`SplatStats`], [`PassTime`] |
+//! | know what went wrong | [`RendererError`], [`GpuError`] |
+//!
+//! # How a splat is made
+//!
+//! The host's depth and normals are read into receivers, and halved six times. Each footprint gets
+//! its covariance, the pixel's added; the level at which it is at least two pixels wide; and, if it
+//! is smaller than a pixel, a factor by which its values at the pixels' middles sum to its flux. Then
+//! tiles sum in fixed point, whose unit is chosen by the sum of the footprints' peaks on the tile, or
+//! quads are blended. Coarse levels are added to finer ones, interpolated over pixels that see the
+//! same surface. The sums are those of the CPU's `splat`: within 0.3 % over the pixels without an
+//! edge by tiles and by 32-bit quads, within 1 % by half floats. Tiles give the same bits in every
+//! run; quads and gathers differ in the last bits, since they add in any order.
+//!
+//! # Limits
+//!
+//! A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one
+//! batch fit one binding, 1.6 million in 128 MiB; more are several batches. A view takes about 70
+//! bytes a pixel, in half floats and eight layers 200. On a browser's device, errors arrive after the
+//! call that caused them, and go to the host's handlers.
+//!
+//! # Sources
+//!
+//! Igehy 1999 for footprints; Yang and Ouyang 2021 for splats of ellipses; Duff et al. 2017 for
+//! frames. The rest is this workspace's own, and is derived where it stands.
 
 mod body_order;
 mod camera_matrix;

@@ -8,7 +8,7 @@ use crate::splat_quads::SplatQuads;
 use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_tiles::SplatTiles;
-use crate::splat_view::{LEVELS, SplatStep};
+use crate::splat_view::{LEVELS, ROUNDS, SplatStep};
 
 const PREPARE: Shader = Shader {
     label: "splat_prepare",
@@ -86,13 +86,13 @@ pub(crate) struct SplatSteps(wgpu::Buffer);
 
 impl SplatSteps {
     fn new(device: &wgpu::Device, layers: u32) -> Result<Self, RendererError> {
-        let mut bytes = vec![0; 2 * LEVELS * STEP_STRIDE as usize];
+        let mut bytes = vec![0; 2 * ROUNDS * LEVELS * STEP_STRIDE as usize];
         for (index, place) in bytes.chunks_exact_mut(STEP_STRIDE as usize).enumerate() {
             let step = SplatStep {
                 level: (index % LEVELS) as u32,
-                is_first: u32::from(index < LEVELS),
+                is_first: u32::from(index / LEVELS % 2 == 0),
                 layers,
-                pad: 0,
+                round: (index / (2 * LEVELS)) as u32,
             };
             place[..size_of::<SplatStep>()].copy_from_slice(bytemuck::bytes_of(&step));
         }
@@ -101,7 +101,16 @@ impl SplatSteps {
     }
 
     pub(crate) fn at(&self, level: usize, is_first: bool) -> wgpu::BindingResource<'_> {
-        let index = level + if is_first { 0 } else { LEVELS };
+        self.in_round(level, is_first, 0)
+    }
+
+    pub(crate) fn in_round(
+        &self,
+        level: usize,
+        is_first: bool,
+        round: usize,
+    ) -> wgpu::BindingResource<'_> {
+        let index = level + LEVELS * (2 * round + usize::from(!is_first));
         let size = size_of::<SplatStep>() as u64;
         part_of(&self.0, STEP_STRIDE * index as u64, size)
     }
@@ -433,7 +442,7 @@ mod tests {
                 level,
                 is_first,
                 layers,
-                pad
+                round
             }
         );
         assert_layout!(

@@ -51,7 +51,8 @@ pub struct SplatOptions {
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
     /// Room for pairs of a footprint and a tile that it touches, for each footprint that a batch
-    /// has room for: 1 to 64. Pairs without room are counted in
+    /// has room for: 2 to 64. Tiles whose pairs do not fit together are summed in up to four rounds;
+    /// pairs without room even then are counted in
     /// [`SplatStats::dropped_pairs`](crate::SplatStats::dropped_pairs).
     pub pairs_per_footprint: u32,
     /// Layers among which quads are shared where they are blended in half floats, 1 to 16. Each
@@ -70,7 +71,7 @@ impl Default for SplatOptions {
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
             pairs_per_footprint: 8,
-            half_float_layers: 4,
+            half_float_layers: 8,
             prefer_half_floats: false,
         }
     }
@@ -98,8 +99,8 @@ impl SplatOptions {
             (
                 "pairs_per_footprint",
                 self.pairs_per_footprint as f32,
-                (1..=64).contains(&self.pairs_per_footprint),
-                "1 to 64",
+                (2..=64).contains(&self.pairs_per_footprint),
+                "2 to 64",
             ),
             (
                 "half_float_layers",

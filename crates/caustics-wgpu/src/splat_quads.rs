@@ -57,7 +57,7 @@ struct SplatDraw {
 /// - quads are shared among layers, each with less in it;
 /// - a sixteenth of the footprints, or 2,048 of a level, is drawn first, for an estimate of each
 ///   pixel's sum. Then each
-///   footprint adds a multiple of a 2^10th of that, rounded up or down so that the mean is right
+///   footprint adds a multiple of a 2^9th of that, rounded up or down so that the mean is right
 ///   (dithering along the golden ratio): such sums are exact.
 #[derive(Clone, Debug)]
 pub(crate) struct SplatQuads {

@@ -7,7 +7,7 @@ use crate::splat::SplatSteps;
 use crate::splat_options::SplatOptions;
 use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
 use crate::splat_targets::SplatTargets;
-use crate::splat_view::LEVELS;
+use crate::splat_view::{LEVELS, ROUNDS, TILE};
 
 const BIN: Shader = Shader {
     label: "splat_bin",
@@ -55,6 +55,7 @@ impl SplatTiles {
             Slot::Write,
             Slot::Write,
             Slot::Write,
+            Slot::Uniform,
         ];
         let bin = PassLayout::new(device, "splat_bin", stages, &bin);
         let tiles = [
@@ -108,17 +109,21 @@ impl SplatTiles {
         into: (usize, bool),
     ) -> Result<(), RendererError> {
         recorder.encoder.clear_buffer(&scratch.tile_counts, 0, None);
-        let bin = self.bin.bind(
-            device,
-            &[
-                view.as_entire_binding(),
-                scratch.places.as_entire_binding(),
-                scratch.tile_starts.as_entire_binding(),
-                scratch.tile_counts.as_entire_binding(),
-                scratch.pairs.as_entire_binding(),
-                targets.counts.as_entire_binding(),
-            ],
-        );
+        let (sums, is_first) = into;
+        let bind = |round| {
+            self.bin.bind(
+                device,
+                &[
+                    view.as_entire_binding(),
+                    scratch.places.as_entire_binding(),
+                    scratch.tile_starts.as_entire_binding(),
+                    scratch.tile_counts.as_entire_binding(),
+                    scratch.pairs.as_entire_binding(),
+                    targets.counts.as_entire_binding(),
+                    steps.in_round(0, is_first, round),
+                ],
+            )
+        };
         let prefix_sum = self.prefix_sum.prepare(
             device,
             &scratch.tile_counts,
@@ -127,41 +132,45 @@ impl SplatTiles {
         )?;
         let groups = batch.capacity().div_ceil(GROUP).max(1);
         {
-            let mut pass = recorder.compute("splat_bin", 5);
+            let mut pass = recorder.compute("splat_bin", 4);
             pass.set_pipeline(&self.count);
-            pass.set_bind_group(0, &bin, &[]);
+            pass.set_bind_group(0, &bind(0), &[]);
             pass.dispatch_workgroups(groups, 1, 1);
             self.prefix_sum.record(&mut pass, &prefix_sum);
-            pass.set_pipeline(&self.scatter);
-            pass.set_bind_group(0, &bin, &[]);
-            pass.dispatch_workgroups(groups, 1, 1);
         }
-        let (sums, is_first) = into;
-        let mut pass = recorder.compute("splat_tiles", LEVELS as u32);
-        pass.set_pipeline(&self.sum);
-        for level in 0..LEVELS {
-            let before = if is_first {
-                &self.nothing
-            } else {
-                &targets.sums[1 - sums].layers[level]
-            };
-            let group = self.tiles.bind(
-                device,
-                &[
-                    view.as_entire_binding(),
-                    steps.at(level, is_first),
-                    scratch.densities.as_entire_binding(),
-                    scratch.places.as_entire_binding(),
-                    scratch.tile_starts.as_entire_binding(),
-                    scratch.pairs.as_entire_binding(),
-                    wgpu::BindingResource::TextureView(&targets.texels[level]),
-                    wgpu::BindingResource::TextureView(before),
-                    wgpu::BindingResource::TextureView(&targets.sums[sums].single[level][0]),
-                ],
-            );
-            let [_, height, across, _] = targets.levels[level];
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(across, height.div_ceil(crate::splat_view::TILE), 1);
+        for round in 0..ROUNDS {
+            {
+                let mut pass = recorder.compute("splat_bin", 1);
+                pass.set_pipeline(&self.scatter);
+                pass.set_bind_group(0, &bind(round), &[]);
+                pass.dispatch_workgroups(groups, 1, 1);
+            }
+            let mut pass = recorder.compute("splat_tiles", LEVELS as u32);
+            pass.set_pipeline(&self.sum);
+            for level in 0..LEVELS {
+                let before = if is_first {
+                    &self.nothing
+                } else {
+                    &targets.sums[1 - sums].layers[level]
+                };
+                let group = self.tiles.bind(
+                    device,
+                    &[
+                        view.as_entire_binding(),
+                        steps.in_round(level, is_first, round),
+                        scratch.densities.as_entire_binding(),
+                        scratch.places.as_entire_binding(),
+                        scratch.tile_starts.as_entire_binding(),
+                        scratch.pairs.as_entire_binding(),
+                        wgpu::BindingResource::TextureView(&targets.texels[level]),
+                        wgpu::BindingResource::TextureView(before),
+                        wgpu::BindingResource::TextureView(&targets.sums[sums].single[level][0]),
+                    ],
+                );
+                let [_, height, across, _] = targets.levels[level];
+                pass.set_bind_group(0, &group, &[]);
+                pass.dispatch_workgroups(across, height.div_ceil(TILE), 1);
+            }
         }
         Ok(())
     }
@@ -178,6 +187,8 @@ mod tests {
             let valid = reflection::validated(shader);
             assert!(valid.is_ok(), "{}", valid.unwrap_err());
         }
+        let rounds = format!("ROUNDS: u32 = {ROUNDS}u;");
+        assert!(TILES.source().contains(&rounds));
         let (module, _) = reflection::validated(&TILES).unwrap();
         let workgroup = naga::AddressSpace::WorkGroup;
         let bytes: u32 = module

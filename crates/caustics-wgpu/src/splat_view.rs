@@ -9,6 +9,10 @@ pub(crate) const LEVELS: usize = 7;
 /// Pixels a side of a tile.
 pub(crate) const TILE: u32 = 16;
 
+/// Rounds in which tiles are summed whose pairs do not fit together. Mirrors `ROUNDS` in
+/// `shaders/splat_place.wgsl`.
+pub(crate) const ROUNDS: usize = 4;
+
 /// The most pixels a side of a view: places of pixels are kept in 16 bits.
 const MAX_SIZE: u32 = 1 << 14;
 
@@ -36,7 +40,7 @@ pub(crate) struct SplatStep {
     pub(crate) level: u32,
     pub(crate) is_first: u32,
     pub(crate) layers: u32,
-    pub(crate) pad: u32,
+    pub(crate) round: u32,
 }
 
 /// The levels of a view of `size` pixels: width, height, tiles across, first tile; and the number

@@ -137,3 +137,35 @@ fn batches_add_up() -> Result<(), TestError> {
     }
     Ok(())
 }
+
+#[test]
+fn pairs_that_do_not_fit_together_are_summed_in_rounds() -> Result<(), TestError> {
+    let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
+        return Ok(());
+    };
+    let stage = Stage::load("p03_cognac", 10_000)?;
+    let picture = stage.picture(&stage.camera, [400, 300]);
+    let run = |pairs_per_footprint| {
+        let options = with(SplatOptions {
+            pairs_per_footprint,
+            ..SplatOptions::default()
+        });
+        irradiance(&device, &queue, &options, &picture, &[&stage.photons])
+    };
+    let (once, once_stats) = run(64)?;
+    let footprints = once_stats.splatted;
+    assert!(once_stats.pairs > 4 * footprints, "{once_stats:?}");
+    let (rounds, stats) = run(4)?;
+    assert_eq!(stats.dropped_pairs, 0, "{stats:?}");
+    assert_eq!(stats, once_stats);
+    assert!(once == rounds);
+    // What does not fit in four rounds is counted, and missing.
+    let (less, stats) = run(2)?;
+    assert!(
+        stats.dropped_pairs > 0 && stats.pairs == once_stats.pairs,
+        "{stats:?}"
+    );
+    let sum = |of: &[[f32; 4]]| of.iter().map(|it| it[0]).sum::<f32>();
+    assert!(sum(&less) < sum(&once));
+    Ok(())
+}

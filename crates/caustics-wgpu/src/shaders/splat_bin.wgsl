@@ -7,6 +7,7 @@
 @group(0) @binding(3) var<storage, read_write> tile_cursors: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> pairs: array<u32>;
 @group(0) @binding(5) var<storage, read_write> counts: SplatCounts;
+@group(0) @binding(6) var<uniform> step: SplatStep;
 
 // Counts, for each tile, the footprints that may light a pixel of it.
 @compute @workgroup_size(256)
@@ -35,13 +36,23 @@ fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     let level = view.levels[place.level];
     let rows = tile_rows(place);
     let room = arrayLength(&pairs);
+    let each = round_pairs(room, arrayLength(&places));
+    // Where all tiles' lists end: most often they fit in one round.
+    let last = view.levels[LEVELS - 1u];
+    let tiles = last.w + last.z * ((last.y + TILE - 1u) / TILE);
+    if step.round * each > tile_starts[tiles] {
+        return;
+    }
     var made = 0u;
     var dropped = 0u;
     for (var row = rows.x; row < rows.y; row++) {
         let columns = tile_columns(place, row);
         for (var column = columns.x; column < columns.y; column++) {
             let tile = level.w + row * level.z + column;
-            let at = tile_starts[tile] + atomicAdd(&tile_cursors[tile], 1u);
+            if round_of(tile_starts[tile], each) != step.round {
+                continue;
+            }
+            let at = tile_starts[tile] - step.round * each + atomicAdd(&tile_cursors[tile], 1u);
             if at < room {
                 pairs[at] = id.x;
             } else {

@@ -96,3 +96,17 @@ fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
         columns.y > columns.x,
     );
 }
+
+// Rounds in which tiles are summed whose pairs do not fit together. Mirrors `ROUNDS` in splat_view.rs.
+const ROUNDS: u32 = 4u;
+
+// Pairs of one round, in buffers with room for so many pairs and so many footprints: a tile that
+// starts in them ends in the buffer, since it has each footprint once.
+fn round_pairs(room: u32, footprints: u32) -> u32 {
+    return max(room, footprints + 1u) - footprints;
+}
+
+// The round in which a tile is summed whose pairs start at so many.
+fn round_of(start: u32, each: u32) -> u32 {
+    return min(start / each, ROUNDS - 1u);
+}

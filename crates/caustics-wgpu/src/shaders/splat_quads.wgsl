@@ -13,9 +13,9 @@ struct SplatDraw {
 // estimate, from a sample of the footprints.
 override QUADS_ROUNDING: u32 = 0u;
 
-// A part of a pixel's sum, in bits, of which everything added is a multiple: one bit less than half
+// A part of a pixel's sum, in bits, of which everything added is a multiple: two bits less than half
 // floats have, since the estimate may be too low.
-const ROUNDED_BITS: f32 = 10.0;
+const ROUNDED_BITS: f32 = 9.0;
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<uniform> quads: SplatDraw;

@@ -30,12 +30,29 @@ var<workgroup> part_sums: array<atomic<u32>, 3>;
 var<workgroup> large: array<u32, 256>;
 var<workgroup> large_count: atomic<u32>;
 var<workgroup> list: vec2<u32>;
+var<workgroup> is_mine: u32;
 
 // The pixels of the tile that a footprint may light: from, and up to but not at.
 fn clipped(place: SplatPlace, corner: vec2<u32>) -> vec4<u32> {
     let columns = clamp(range_of(place.columns), vec2<u32>(corner.x), vec2<u32>(corner.x + TILE));
     let rows = clamp(range_of(place.rows), vec2<u32>(corner.y), vec2<u32>(corner.y + TILE));
     return vec4<u32>(columns - corner.x, rows - corner.y);
+}
+
+// The pixels of a row of the tile that its ellipse covers, with one to spare on each side: a pixel's
+// receiver need not lie under its middle.
+fn row_span(place: SplatPlace, box: vec4<u32>, corner: vec2<u32>, row: u32) -> vec2<u32> {
+    if place.is_local == 0u {
+        return box.xy;
+    }
+    let ends = ellipse_span(place, f32(corner.y + row) + 0.5 - place.center.y);
+    if ends.y < ends.x {
+        return vec2<u32>(box.x);
+    }
+    let middle = place.center.x - f32(corner.x) - 0.5;
+    let low = clamp(floor(middle + ends.x), f32(box.x), f32(box.y));
+    let high = clamp(ceil(middle + ends.y) + 1.0, low, f32(box.y));
+    return vec2<u32>(u32(low), u32(high));
 }
 
 @compute @workgroup_size(256)
@@ -61,7 +78,10 @@ fn splat_tiles(
     if local == 0u {
         let tile = level.w + group.y * level.z + group.x;
         let room = arrayLength(&pairs);
-        list = min(vec2<u32>(tile_starts[tile], tile_starts[tile + 1u]), vec2<u32>(room));
+        let each = round_pairs(room, arrayLength(&places));
+        let starts = vec2<u32>(tile_starts[tile], tile_starts[tile + 1u]);
+        is_mine = u32(round_of(starts.x, each) == step.round);
+        list = min(starts - step.round * each, vec2<u32>(room));
         atomicStore(&large_count, 0u);
         for (var channel = 0u; channel < 3u; channel++) {
             atomicStore(&largest_bits[channel], 0u);
@@ -71,6 +91,9 @@ fn splat_tiles(
     atomicStore(&sums[local], 0u);
     atomicStore(&sums[local + 256u], 0u);
     atomicStore(&sums[local + 512u], 0u);
+    if workgroupUniformLoad(&is_mine) == 0u {
+        return;
+    }
     let range = workgroupUniformLoad(&list);
     let count = range.y - range.x;
 
@@ -116,12 +139,18 @@ fn splat_tiles(
                 let index = pairs[base + local];
                 let place = places[index];
                 let box = clipped(place, corner);
-                if (box.y - box.x) * (box.w - box.z) <= SMALL_AREA {
+                var area = 0u;
+                for (var y = box.z; y < box.w; y++) {
+                    let span = row_span(place, box, corner, y);
+                    area += span.y - span.x;
+                }
+                if area <= SMALL_AREA {
                     let stored = densities[index];
                     let plane = decode_octahedral(stored.normal);
                     let incoming = decode_octahedral(stored.incoming);
                     for (var y = box.z; y < box.w; y++) {
-                        for (var x = box.x; x < box.y; x++) {
+                        let span = row_span(place, box, corner, y);
+                        for (var x = span.x; x < span.y; x++) {
                             let at = TILE * y + x;
                             let weight = density_weight(stored, plane, incoming, positions[at], normals[at]);
                             if weight > 0.0 {

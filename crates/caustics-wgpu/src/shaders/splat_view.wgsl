@@ -33,7 +33,8 @@ struct SplatStep {
     is_first: u32,
     // Layers of the accumulated irradiance.
     layers: u32,
-    pad: u32,
+    // Tiles whose pairs do not fit together are summed in as many rounds as it takes.
+    round: u32,
 }
 
 // One pixel's receiver: position, and the normal (octahedral); `NO_RECEIVER` where there is none.
