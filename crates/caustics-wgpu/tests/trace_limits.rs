@@ -136,7 +136,7 @@ fn buffers_follow_a_scene_that_moves() {
     let mut scene = SceneBuffers::new(device, &before.world).unwrap();
     let fresh = SceneBuffers::new(device, &after.world).unwrap();
     let buffers = PhotonBuffers::new(device, PHOTONS, 8 * PHOTONS).unwrap();
-    let mut trace = |scene: &SceneBuffers, mut encoder: wgpu::CommandEncoder| {
+    let trace = |scene: &SceneBuffers, mut encoder: wgpu::CommandEncoder| {
         buffers.clear(&mut encoder);
         tracer
             .trace(device, &mut encoder, scene, &plan, 0..PHOTONS, &buffers)
