@@ -11,6 +11,7 @@ mod cone;
 mod cosine_hemisphere;
 mod disc_concentric;
 mod disc_polar;
+mod sine_cosine;
 mod sphere_octahedral;
 mod sphere_polar;
 mod triangle;

@@ -115,6 +115,13 @@ impl Lattice {
         &self.points
     }
 
+    /// The runs of consecutive points that are used, each as the number of its first point in the set
+    /// and of the used points before it; `None` where all are.
+    pub(crate) fn spans(&self) -> Option<impl Iterator<Item = (u32, u32)>> {
+        let spans = self.spans.as_ref()?;
+        Some(spans.iter().map(|span| (span.first, span.before)))
+    }
+
     /// The number in the whole set of used point `index`.
     pub(crate) fn number(&self, index: u32) -> u32 {
         match &self.spans {

@@ -224,6 +224,17 @@ impl EnergyLedger {
         self.rays += other.rays;
     }
 
+    /// Adds a line that was summed elsewhere to that of `fate`.
+    pub fn add(&mut self, fate: Fate, entry: &LedgerEntry) {
+        self.fates[fate as usize].merge(entry);
+    }
+
+    /// Adds what was emitted elsewhere, and the flux that roulette gave there, in watts.
+    pub fn add_emitted(&mut self, entry: &LedgerEntry, roulette_gain: DVec3) {
+        self.emitted.merge(entry);
+        self.roulette_gain += roulette_gain;
+    }
+
     /// Adds another ledger's lines to this one.
     pub fn merge(&mut self, other: &Self) {
         self.emitted.merge(&other.emitted);

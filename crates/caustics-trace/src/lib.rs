@@ -163,4 +163,4 @@ pub use photon::{FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
-pub use trace::{trace_part, trace_photons, trace_plan};
+pub use trace::{PhotonTrail, trace_part, trace_photon, trace_photons, trace_plan};

@@ -165,7 +165,7 @@ impl EmissionPlan {
     }
 
     /// The batches of each light.
-    pub(crate) fn lights(&self) -> impl Iterator<Item = &[EmissionBatch]> {
+    pub fn lights(&self) -> impl Iterator<Item = &[EmissionBatch]> {
         self.batches
             .chunk_by(|a, b| a.emitter.source() == b.emitter.source())
     }
@@ -282,17 +282,24 @@ impl EmissionBatch {
         self.lattice.number(index)
     }
 
+    /// The runs of consecutive points that photons are made from, in order: the number of the first
+    /// in the set of points, and the photons before it. `None` where all points are used.
+    #[must_use]
+    pub fn spans(&self) -> Option<impl Iterator<Item = (u32, u32)>> {
+        self.lattice.spans()
+    }
+
+    /// The first word of the streams that photons draw from: with the number of a point as the
+    /// second, a stream of [`random`](Self::random).
+    #[must_use]
+    pub fn stream(&self) -> u32 {
+        self.stream
+    }
+
     /// The sample of photon `index`, below [`count`](Self::count).
     #[must_use]
     pub fn sample(&self, index: u32) -> EmissionSample {
         self.lattice.sample(index)
-    }
-
-    /// The upper half of the stream that [`random`](Self::random) draws from: the same for this pair
-    /// in every frame.
-    #[must_use]
-    pub fn stream(&self) -> u32 {
-        self.stream
     }
 
     /// Where the photon of point `number` draws its random decisions from.

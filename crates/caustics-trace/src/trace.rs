@@ -4,9 +4,9 @@ use caustics_scene::World;
 use glam::DVec3;
 
 use crate::emission::EmissionSample;
-use crate::ledger::Fate;
+use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{TraceError, TraceOptions};
-use crate::photon::PhotonMap;
+use crate::photon::{Photon, PhotonMap};
 use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
 use crate::traced::Traced;
@@ -128,6 +128,57 @@ pub fn trace_part<I: Intersect + ?Sized>(
     Ok(map)
 }
 
+/// What one emitted photon came to, as [`trace_photon`] returns it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PhotonTrail {
+    /// Its parts that were stored, in the order in which they landed.
+    pub photons: Vec<Photon>,
+    /// For each of them, a hash of the objects that it met and of what it did there. Photons of one
+    /// path are parts of one smooth sheet of light.
+    pub paths: Vec<u32>,
+    /// Where its energy went.
+    pub ledger: EnergyLedger,
+}
+
+/// Traces one photon of a plan, counted over all its batches in their order, and all its branches:
+/// what [`trace_part`] does for a range, with its paths. A number from [`EmissionPlan::count`] on has
+/// an empty trail.
+///
+/// # Errors
+/// If the options are out of range.
+pub fn trace_photon<I: Intersect + ?Sized>(
+    world: &World,
+    intersect: &I,
+    plan: &EmissionPlan,
+    options: &TraceOptions,
+    photon: u32,
+) -> Result<PhotonTrail, TraceError> {
+    options.validate()?;
+    let mut index = photon;
+    for of_light in plan.lights() {
+        for (number, planned) in of_light.iter().enumerate() {
+            if index >= planned.count() {
+                index -= planned.count();
+                continue;
+            }
+            let batch = Batch {
+                world,
+                intersect,
+                options,
+                plan,
+                planned,
+                earlier: &of_light[..number],
+            };
+            return Ok(if planned.emitter().dimensions() == 2 {
+                batch.trail::<2>(index)
+            } else {
+                batch.trail::<4>(index)
+            });
+        }
+    }
+    Ok(PhotonTrail::default())
+}
+
 /// The flux of all photons so far, that of directions which two pairs cover counted once.
 fn counted(map: &PhotonMap) -> DVec3 {
     map.ledger.emitted().flux - map.ledger.entry(Fate::Overlap).flux
@@ -196,19 +247,32 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         let mut starts = Vec::with_capacity(range.len());
         for index in range {
             starts.push(tracer.photons.len());
-            let number = self.planned.point_number(index);
-            let sample = EmissionSample::of(self.planned.points(), number);
-            let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) else {
-                continue;
-            };
-            let mut rng = self.planned.random(self.options.seed, u64::from(number));
-            tracer.trace(&emission, self.planned.media(), &mut rng);
+            self.send(&mut tracer, index);
         }
         Traced {
             photons: tracer.photons,
             paths: tracer.paths,
             starts,
             ledger: tracer.ledger,
+        }
+    }
+
+    fn trail<const N: usize>(&self, index: u32) -> PhotonTrail {
+        let mut tracer = self.tracer::<N>();
+        self.send(&mut tracer, index);
+        PhotonTrail {
+            photons: tracer.photons,
+            paths: tracer.paths,
+            ledger: tracer.ledger,
+        }
+    }
+
+    fn send<const N: usize>(&self, tracer: &mut PathTracer<'_, I, N>, index: u32) {
+        let number = self.planned.point_number(index);
+        let sample = EmissionSample::of(self.planned.points(), number);
+        if let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) {
+            let mut rng = self.planned.random(self.options.seed, u64::from(number));
+            tracer.trace(&emission, self.planned.media(), &mut rng);
         }
     }
 }

@@ -334,12 +334,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             kept *= survival;
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
-        let apart = if N > 0 {
-            kept.powf(-1.0 / N as f32)
-        } else {
-            1.0
-        };
-        let differential = self.scattered(branch, point, outgoing).scaled(apart);
+        // By roots, which round alike on every machine, as powers do not.
+        let root = kept.sqrt();
+        let differential = self
+            .scattered(branch, point, outgoing)
+            .scaled(1.0 / if N > 2 { root.sqrt() } else { root });
         let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {

@@ -113,6 +113,12 @@ impl Cone {
         1.0 - self.height
     }
 
+    /// `1 - cosine` of the half angle, in (0, 2], to all its digits where the cosine has none left.
+    #[must_use]
+    pub fn height(self) -> f32 {
+        self.height
+    }
+
     /// Solid angle, in steradians.
     #[must_use]
     pub fn solid_angle(self) -> f32 {

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec2Swizzles};
 use crate::unit_interval::nearest;
 
 use super::WarpSample;
+use super::sine_cosine::sine_cosine;
 
 /// Maps the unit square to the unit disc, concentric squares to circles; density `1/pi`.
 ///
@@ -23,7 +24,7 @@ pub fn square_to_disc_concentric(uv: Vec2) -> WarpSample<Vec2> {
         (centred.y, centred.x)
     };
     let ratio = if radius == 0.0 { 0.0 } else { other / radius };
-    let (sin, cos) = (FRAC_PI_4 * ratio).sin_cos();
+    let (sin, cos) = sine_cosine(FRAC_PI_4 * ratio);
     let value = radius * Vec2::new(cos, sin);
     let d_radius = 2.0 * Vec2::new(cos + FRAC_PI_4 * ratio * sin, sin - FRAC_PI_4 * ratio * cos);
     let d_other = FRAC_PI_2 * Vec2::new(-sin, cos);

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use crate::unit_interval::nearest;
 
 use super::WarpSample;
+use super::sine_cosine::sine_cosine;
 
 /// Maps the unit square to the unit sphere by way of an octahedron; density `1/(4 pi)`.
 ///
@@ -27,7 +28,7 @@ pub fn square_to_sphere_octahedral(uv: Vec2) -> WarpSample<Vec3> {
     let up = if above { 1.0 } else { -1.0 };
     let r = p + q;
     let (p_part, q_part) = if r > 0.0 { (p / r, q / r) } else { (0.5, 0.5) };
-    let (sin, cos) = (FRAC_PI_4 * (q_part - p_part + 1.0)).sin_cos();
+    let (sin, cos) = sine_cosine(FRAC_PI_4 * (q_part - p_part + 1.0));
     let stretch = (2.0 - r * r).sqrt();
     let radius = r * stretch;
 

@@ -1,0 +1,83 @@
+use std::future::Future;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+use crate::renderer_error::RendererError;
+
+/// Catches what a device has to say while a closure talks to it.
+///
+/// Native devices answer at once. A browser answers later: there, what is not known yet is left to
+/// the host's own handlers.
+pub(crate) fn caught<T>(
+    device: &wgpu::Device,
+    work: impl FnOnce() -> Result<T, RendererError>,
+) -> Result<T, RendererError> {
+    let scopes = [
+        wgpu::ErrorFilter::Internal,
+        wgpu::ErrorFilter::OutOfMemory,
+        wgpu::ErrorFilter::Validation,
+    ]
+    .map(|filter| device.push_error_scope(filter));
+    let result = work();
+    let mut first = None;
+    // Popped in the reverse order.
+    for scope in scopes.into_iter().rev() {
+        if let Some(Some(error)) = answer(scope.pop()) {
+            first = Some(match error {
+                wgpu::Error::OutOfMemory { .. } => RendererError::OutOfMemory,
+                other => RendererError::Device {
+                    message: other.to_string(),
+                },
+            });
+        }
+    }
+    first.map_or(result, Err)
+}
+
+fn answer<T>(future: impl Future<Output = T>) -> Option<T> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(value) => Some(value),
+        Poll::Pending => None,
+    }
+}
+
+/// A buffer with these contents: they travel with the buffer and not with the queue, so that a
+/// later frame cannot overwrite them before they are read.
+///
+/// # Errors
+/// If the device is lost: it gives no memory to write to.
+pub(crate) fn filled_buffer(
+    device: &wgpu::Device,
+    label: &'static str,
+    usage: wgpu::BufferUsages,
+    bytes: &[u8],
+) -> Result<wgpu::Buffer, RendererError> {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: (bytes.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+        usage,
+        mapped_at_creation: true,
+    });
+    let Ok(mut memory) = buffer.slice(..).get_mapped_range_mut() else {
+        return Err(RendererError::DeviceLost);
+    };
+    memory.slice(..bytes.len()).copy_from_slice(bytes);
+    drop(memory);
+    buffer.unmap();
+    Ok(buffer)
+}
+
+/// A buffer of this size, for storage and copies.
+pub(crate) fn storage_buffer(
+    device: &wgpu::Device,
+    label: &'static str,
+    size: u64,
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: size.max(16).next_multiple_of(16),
+        usage: usage | wgpu::BufferUsages::STORAGE,
+        mapped_at_creation: false,
+    })
+}

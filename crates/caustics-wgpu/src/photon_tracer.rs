@@ -1,0 +1,517 @@
+use std::ops::Range;
+
+use crate::GpuError;
+use crate::error_scope::filled_buffer;
+use crate::pass_layout::{PassLayout, Slot};
+use crate::photon_buffers::PhotonBuffers;
+use crate::recorder::{RecordedWork, Recorder};
+use crate::renderer_error::RendererError;
+use crate::scene_buffers::{SceneBuffers, fits};
+use crate::shader::{FOOTPRINT_RECORD, Shader, ShaderPiece, shader_piece};
+use crate::trace_params::{MAX_EMITTERS, TraceParams};
+use crate::trace_plan::{PlannedEmitter, TracePlan};
+
+/// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
+const WORKGROUP_SIZE: u32 = 64;
+
+const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 31] {
+    [
+        parameters,
+        FOOTPRINT_RECORD,
+        shader_piece!("trace_params"),
+        shader_piece!("scene"),
+        shader_piece!("scene_bindings"),
+        shader_piece!("rounding"),
+        shader_piece!("vector"),
+        shader_piece!("double_float"),
+        shader_piece!("random"),
+        shader_piece!("wide_integer"),
+        shader_piece!("sobol"),
+        shader_piece!("halton"),
+        shader_piece!("point_set"),
+        shader_piece!("warp"),
+        shader_piece!("warp_inverse"),
+        shader_piece!("ray"),
+        shader_piece!("watertight"),
+        shader_piece!("sphere"),
+        shader_piece!("traverse"),
+        shader_piece!("spawn"),
+        shader_piece!("surface"),
+        shader_piece!("optics"),
+        shader_piece!("media"),
+        shader_piece!("scatter"),
+        shader_piece!("differential"),
+        shader_piece!("emission"),
+        shader_piece!("area_emission"),
+        shader_piece!("overlap"),
+        shader_piece!("ledger"),
+        shader_piece!("photon_store"),
+        shader_piece!("tracer"),
+    ]
+}
+
+/// For lights without area, whose rays have two parameters.
+const SHADER_2: Shader = Shader {
+    label: "tracer of 2 parameters",
+    pieces: &pieces(shader_piece!("parameters_2")),
+};
+
+/// For area lights, whose rays have four.
+const SHADER_4: Shader = Shader {
+    label: "tracer of 4 parameters",
+    pieces: &pieces(shader_piece!("parameters_4")),
+};
+
+/// What the shader binds, in the order of its bindings.
+const SLOTS: [Slot; 9] = [
+    Slot::Uniform,
+    Slot::Read,
+    Slot::Read,
+    Slot::Read,
+    Slot::Read,
+    Slot::Read,
+    Slot::Write,
+    Slot::Write,
+    Slot::Write,
+];
+
+/// Traces photons on the GPU: emission, flight and landing in one dispatch, one photon to an
+/// invocation.
+///
+/// It binds eight storage buffers, as many as WebGPU's default limits allow.
+#[derive(Clone, Debug)]
+pub struct PhotonTracer {
+    layout: PassLayout,
+    /// For rays of 2 and of 4 parameters.
+    pipelines: [wgpu::ComputePipeline; 2],
+}
+
+impl PhotonTracer {
+    /// Compiles the shaders. What the device has against them it tells its error scopes.
+    #[must_use]
+    pub fn new(device: &wgpu::Device) -> Self {
+        let layout = PassLayout::new(device, "photon tracer", wgpu::ShaderStages::COMPUTE, &SLOTS);
+        let pipelines = [SHADER_2, SHADER_4]
+            .map(|shader| layout.compute(device, &shader, "trace_photons", &[]));
+        Self { layout, pipelines }
+    }
+
+    /// Records the tracing of a range of the plan's photons, whose records are appended to the
+    /// buffers.
+    ///
+    /// Before the first batch of a frame call [`PhotonBuffers::clear`]; before every other,
+    /// [`PhotonBuffers::forget_records`].
+    ///
+    /// # Errors
+    /// [`GpuError::PhotonRange`], as [`RendererError::Gpu`]; [`RendererError::DeviceLost`].
+    pub fn trace(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &SceneBuffers,
+        plan: &TracePlan,
+        photons: Range<u32>,
+        into: &PhotonBuffers,
+    ) -> Result<RecordedWork, RendererError> {
+        let mut recorder = Recorder::new(encoder, None);
+        self.record(device, &mut recorder, scene, plan, photons, into)?;
+        Ok(recorder.finish().1)
+    }
+
+    pub(crate) fn record(
+        &self,
+        device: &wgpu::Device,
+        recorder: &mut Recorder<'_>,
+        scene: &SceneBuffers,
+        plan: &TracePlan,
+        photons: Range<u32>,
+        into: &PhotonBuffers,
+    ) -> Result<(), RendererError> {
+        if photons.end > plan.photons() || photons.len() as u64 > u64::from(into.photons()) {
+            return Err(RendererError::Gpu(GpuError::PhotonRange {
+                first: photons.start,
+                end: photons.end,
+                photons: plan.photons(),
+                batch: into.photons(),
+            }));
+        }
+        // A photon that no dispatch is for has no records.
+        recorder.encoder.clear_buffer(&into.links, 0, None);
+        fits(device, "lists of emitters", 4 * plan.lists.len() as u64)?;
+        let lists = filled_buffer(
+            device,
+            "lists of emitters",
+            wgpu::BufferUsages::STORAGE,
+            bytemuck::cast_slice(&plan.lists),
+        )?;
+        let mut dispatches = Vec::new();
+        for dispatch in dispatches_of(&plan.emitters, &photons) {
+            let params = self.params(scene, plan, &photons, &dispatch, into);
+            let uniform = filled_buffer(
+                device,
+                "trace params",
+                wgpu::BufferUsages::UNIFORM,
+                bytemuck::bytes_of(&params),
+            )?;
+            let resources = [
+                &uniform,
+                &scene.nodes,
+                &scene.vertices,
+                &scene.triangles,
+                &scene.bodies,
+                &lists,
+                &into.records,
+                &into.counters,
+                &into.links,
+            ]
+            .map(wgpu::Buffer::as_entire_binding);
+            let group = self.layout.bind(device, &resources);
+            dispatches.push((usize::from(dispatch.dimensions > 2), group, params.count));
+        }
+        let mut pass = recorder.compute("trace", dispatches.len() as u32);
+        for (pipeline, group, count) in &dispatches {
+            pass.set_pipeline(&self.pipelines[*pipeline]);
+            pass.set_bind_group(0, group, &[]);
+            let groups = count.div_ceil(WORKGROUP_SIZE);
+            pass.dispatch_workgroups(groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1);
+        }
+        Ok(())
+    }
+
+    fn params(
+        &self,
+        scene: &SceneBuffers,
+        plan: &TracePlan,
+        batch: &Range<u32>,
+        dispatch: &Dispatch,
+        into: &PhotonBuffers,
+    ) -> TraceParams {
+        let mut params = TraceParams {
+            zero: 0,
+            first: dispatch.photons.start,
+            count: dispatch.photons.len() as u32,
+            batch_first: batch.start,
+            emitter_count: dispatch.emitters.len() as u32,
+            sequence: plan.sequence(),
+            seed_low: plan.options.seed as u32,
+            seed_high: (plan.options.seed >> 32) as u32,
+            max_depth: plan.options.max_depth,
+            branching: plan.branching(),
+            min_weight: plan.options.min_weight,
+            flux_scale: plan.flux_scale,
+            first_link: into.photons(),
+            root: scene.root,
+            unused_a: 0,
+            unused_b: 0,
+            emitters: [crate::trace_params::Emitter::default(); MAX_EMITTERS],
+        };
+        let emitters = &plan.emitters[dispatch.emitters.clone()];
+        for (slot, emitter) in params.emitters.iter_mut().zip(emitters) {
+            *slot = emitter.mirror;
+            slot.first_of_light -= dispatch.emitters.start as u32;
+        }
+        params
+    }
+}
+
+/// Workgroups of a dispatch along its first axis.
+const MAX_GROUPS: u32 = 32_768;
+
+/// Consecutive photons of emitters that are all of one kind.
+#[derive(Clone, Debug, PartialEq)]
+struct Dispatch {
+    photons: Range<u32>,
+    emitters: Range<usize>,
+    dimensions: u32,
+}
+
+/// The fewest dispatches for a range of photons. Those of one light stay together, since each emitter
+/// asks what the light's earlier ones cover.
+fn dispatches_of(emitters: &[PlannedEmitter], photons: &Range<u32>) -> Vec<Dispatch> {
+    let mut all: Vec<Dispatch> = Vec::new();
+    let mut index = 0;
+    for light in emitters.chunk_by(|a, b| a.mirror.first_of_light == b.mirror.first_of_light) {
+        let of_light = index..index + light.len();
+        index = of_light.end;
+        let [first, last] = [&light[0].mirror, &light[light.len() - 1].mirror];
+        let start = first.first.max(photons.start);
+        let end = (last.first + last.count).min(photons.end);
+        if start >= end {
+            continue;
+        }
+        let dimensions = light[0].dimensions;
+        match all.last_mut() {
+            Some(before)
+                if before.dimensions == dimensions
+                    && before.photons.end == start
+                    && before.emitters.end == of_light.start
+                    && of_light.end - before.emitters.start <= MAX_EMITTERS =>
+            {
+                before.photons.end = end;
+                before.emitters.end = of_light.end;
+            }
+            _ => all.push(Dispatch {
+                photons: start..end,
+                emitters: of_light,
+                dimensions,
+            }),
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TraceCounters;
+    use crate::gpu_scene::{Body, NO_PRIMITIVE, Node, SPHERE_BIT, Triangle, Vertex};
+    use crate::scene_hierarchy::MAX_LEVELS;
+    use crate::shader::{assert_layout, reflection};
+    use crate::trace_params::{Emitter, NO_CASTER};
+    use caustics_trace::ProjectionMap;
+
+    #[test]
+    fn every_variant_is_valid_and_agrees_with_rust() {
+        for (shader, parameters) in [(SHADER_2, 2), (SHADER_4, 4)] {
+            let (module, _) = reflection::validated(&shader).unwrap_or_else(|it| panic!("{it}"));
+            let slots: Vec<(u32, Slot)> = (0..).zip(SLOTS).collect();
+            assert_eq!(reflection::buffers(&module), slots);
+            let size = reflection::workgroup_size(&module, "trace_photons");
+            assert_eq!(size, [WORKGROUP_SIZE, 1, 1]);
+            let constant = |name| reflection::constant(&module, name);
+            assert_eq!(constant("PARAMETERS"), parameters);
+            assert_eq!(constant("MAX_EMITTERS"), MAX_EMITTERS as u32);
+            assert_eq!(constant("MAX_LEVELS"), MAX_LEVELS);
+            assert_eq!(constant("SPHERE_BIT"), SPHERE_BIT);
+            assert_eq!(constant("NO_PRIMITIVE"), NO_PRIMITIVE);
+            assert_eq!(constant("COUNTERS"), TraceCounters::WORDS as u32);
+            assert_eq!(constant("BODY_RECEIVER"), Body::RECEIVER);
+            assert_eq!(constant("BODY_DIELECTRIC"), Body::DIELECTRIC);
+            assert_eq!(constant("BODY_METAL"), Body::METAL);
+            assert_eq!(constant("EMITTER_SPHERE"), Emitter::SPHERE);
+            assert_eq!(constant("EMITTER_CONE"), Emitter::CONE);
+            assert_eq!(constant("EMITTER_RECTANGLE"), Emitter::RECTANGLE);
+            assert_eq!(constant("EMITTER_AREA"), Emitter::AREA);
+            assert_eq!(constant("SURFACE_OBJECT"), Emitter::SURFACE_OBJECT);
+            assert_eq!(constant("SURFACE_RECTANGLE"), Emitter::SURFACE_RECTANGLE);
+            assert_eq!(constant("SURFACE_DISC"), Emitter::SURFACE_DISC);
+            assert_eq!(constant("SURFACE_CAP"), Emitter::SURFACE_CAP);
+            assert_eq!(constant("NO_CASTER"), NO_CASTER);
+            assert_eq!(constant("NO_MAP"), Emitter::NO_MAP);
+            assert_eq!(constant("MAP_RESOLUTION"), ProjectionMap::RESOLUTION);
+        }
+    }
+
+    #[test]
+    fn structs_are_laid_out_as_in_rust() {
+        let (module, _) = reflection::validated(&SHADER_2).unwrap();
+        assert_layout!(
+            &module,
+            Node {
+                low,
+                first,
+                high,
+                is_leaf
+            }
+        );
+        assert_layout!(
+            &module,
+            Vertex {
+                position,
+                normal_x,
+                normal_y,
+                normal_z,
+                unused_a,
+                unused_b
+            }
+        );
+        assert_layout!(&module, Triangle { a, b, c, body });
+        assert_layout!(
+            &module,
+            Body {
+                color,
+                kind,
+                channel_ior,
+                ior,
+                center,
+                radius,
+                object,
+                priority,
+                disperses,
+                caster
+            }
+        );
+        assert_layout!(
+            &module,
+            Emitter {
+                kind,
+                first,
+                count,
+                points,
+                place,
+                generator,
+                share,
+                media,
+                origin,
+                solid_angle,
+                tangent,
+                height,
+                bitangent,
+                inner_cosine,
+                axis,
+                outer_cosine,
+                intensity,
+                area,
+                spot_axis,
+                side,
+                target_center,
+                target_radius,
+                first_primitive,
+                primitive_count,
+                first_cumulative,
+                media_count,
+                basis,
+                rows,
+                stream,
+                caster,
+                first_of_light,
+                first_span,
+                span_count,
+                first_map,
+                surface,
+                radius,
+                unused_a,
+                unused_b,
+                unused_c,
+            }
+        );
+        assert_layout!(
+            &module,
+            TraceParams {
+                zero,
+                first,
+                count,
+                batch_first,
+                emitter_count,
+                sequence,
+                seed_low,
+                seed_high,
+                max_depth,
+                branching,
+                min_weight,
+                flux_scale,
+                first_link,
+                root,
+                unused_a,
+                unused_b,
+                emitters,
+            }
+        );
+    }
+
+    #[test]
+    fn counters_lie_where_rust_reads_them() {
+        let (module, _) = reflection::validated(&SHADER_2).unwrap();
+        let words = [
+            ("COUNTER_STORED", TraceCounters::STORED),
+            ("COUNTER_LINES", TraceCounters::LINES),
+            ("COUNTER_RAYS", TraceCounters::RAYS),
+            ("COUNTER_FALLBACKS", TraceCounters::FALLBACKS),
+            ("COUNTER_BOUNDED", TraceCounters::BOUNDED),
+            ("COUNTER_SUMS", TraceCounters::SUMS),
+            ("FATE_CROWDED", TraceCounters::CROWDED),
+            ("LINE_EMITTED", TraceCounters::EMITTED),
+            ("LINE_ROULETTE_GAIN", TraceCounters::ROULETTE_GAIN),
+        ];
+        for (name, word) in words {
+            assert_eq!(reflection::constant(&module, name), word as u32, "{name}");
+        }
+        for (line, fate) in TraceCounters::FATES.into_iter().enumerate() {
+            let name = format!("FATE_{}", fate.name().to_uppercase().replace(' ', "_"));
+            assert_eq!(reflection::constant(&module, &name), line as u32);
+        }
+        let sums = TraceCounters::WORDS - TraceCounters::SUMS;
+        assert_eq!(sums as u32, 6 * reflection::constant(&module, "LINES"));
+    }
+
+    /// The variant for area lights with a piece after the others.
+    fn with_piece(source: &'static str) -> Shader {
+        let mut pieces = SHADER_4.pieces.to_vec();
+        pieces.push(ShaderPiece {
+            name: "last",
+            source,
+        });
+        Shader {
+            label: "changed",
+            pieces: pieces.leak(),
+        }
+    }
+
+    #[test]
+    fn a_broken_variant_is_rejected() {
+        assert!(reflection::validated(&with_piece("fn whole() -> u32 { return 1u; }\n")).is_ok());
+        for broken in [
+            "fn wrong_type() -> u32 { return trace.min_weight; }\n",
+            "fn no_such_member() -> f32 { return trace.max_weight; }\n",
+            "const SPHERE_BIT: u32 = 1u;\n",
+            "fn writes_the_scene() { nodes[0].first = 1u; }\n",
+        ] {
+            assert!(
+                reflection::validated(&with_piece(broken)).is_err(),
+                "{broken}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_layout_that_differs_is_seen() {
+        let moved = "struct Moved { a: f32, position: vec3<f32> }\n\
+                     fn first_of(it: Moved) -> f32 { return it.a; }\n";
+        let (module, _) = reflection::validated(&with_piece(moved)).unwrap();
+        let (members, size) = reflection::layout(&module, "Moved");
+        assert_eq!(members[1], ("position".to_owned(), 16));
+        assert_eq!(size, 32);
+    }
+
+    #[test]
+    fn photons_of_one_kind_share_a_dispatch() {
+        let emitter = |first, count, first_of_light, dimensions| PlannedEmitter {
+            mirror: Emitter {
+                first,
+                count,
+                first_of_light,
+                ..Emitter::default()
+            },
+            dimensions,
+        };
+        // Two emitters of one light, one of which has no photons; others of one each.
+        let emitters = vec![
+            emitter(0, 0, 0, 2),
+            emitter(0, 10, 0, 2),
+            emitter(10, 5, 2, 2),
+            emitter(15, 7, 3, 4),
+            emitter(22, 3, 4, 2),
+        ];
+        let expected = |photons, emitters, dimensions| Dispatch {
+            photons,
+            emitters,
+            dimensions,
+        };
+        assert_eq!(
+            dispatches_of(&emitters, &(0..25)),
+            [
+                expected(0..15, 0..3, 2),
+                expected(15..22, 3..4, 4),
+                expected(22..25, 4..5, 2)
+            ]
+        );
+        assert_eq!(
+            dispatches_of(&emitters, &(12..17)),
+            [expected(12..15, 2..3, 2), expected(15..17, 3..4, 4)]
+        );
+        assert_eq!(dispatches_of(&emitters, &(4..9)), [expected(4..9, 0..2, 2)]);
+        assert_eq!(dispatches_of(&emitters, &(5..5)), []);
+        let many: Vec<_> = (0..130).map(|first| emitter(first, 1, first, 2)).collect();
+        assert_eq!(dispatches_of(&many, &(0..130)).len(), 3);
+    }
+}

@@ -1,0 +1,131 @@
+use std::ops::Range;
+
+use bytemuck::Pod;
+use caustics_scene::World;
+
+use crate::GpuError;
+use crate::body_order::BodyOrder;
+use crate::error_scope::filled_buffer;
+use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex};
+use crate::renderer_error::RendererError;
+use crate::scene_hierarchy::SceneHierarchy;
+
+/// A [`World`] where the shaders can trace it: vertices, triangles, objects with their materials,
+/// and a hierarchy of boxes over all of it.
+///
+/// Each kind is one buffer that is bound whole. Within WebGPU's default limits of 128 MiB a binding
+/// that is room for two million triangles; more is refused.
+#[derive(Clone, Debug)]
+pub struct SceneBuffers {
+    pub(crate) nodes: wgpu::Buffer,
+    pub(crate) vertices: wgpu::Buffer,
+    pub(crate) triangles: wgpu::Buffer,
+    pub(crate) bodies: wgpu::Buffer,
+    pub(crate) root: u32,
+    /// Nodes by row, the leaves first; and where the rows lie in it.
+    pub(crate) refit_order: wgpu::Buffer,
+    pub(crate) rows: Vec<Range<u32>>,
+    /// By how much each leaf's box is wider than what it holds, in metres.
+    pub(crate) margin: f32,
+    pub(crate) counts: SceneCounts,
+    bytes: u64,
+}
+
+/// How many elements the buffers were made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SceneCounts {
+    pub(crate) vertices: usize,
+    pub(crate) triangles: usize,
+    pub(crate) bodies: usize,
+}
+
+impl SceneBuffers {
+    /// Builds the hierarchy and fills the buffers. They travel to the device with the next submission
+    /// that uses them.
+    ///
+    /// # Errors
+    /// [`GpuError::BufferTooLarge`] and [`GpuError::TooMany`], as [`RendererError::Gpu`];
+    /// [`RendererError::DeviceLost`] where the device gives no memory.
+    pub fn new(device: &wgpu::Device, world: &World) -> Result<Self, RendererError> {
+        let packed = PackedScene::new(world)?;
+        let hierarchy = SceneHierarchy::new(world, &BodyOrder::new(world)?);
+        let mut bytes = 0;
+        let nodes = upload::<Node>(device, "nodes", &hierarchy.nodes, &mut bytes)?;
+        let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
+        let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
+        let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
+        let (order, rows) = hierarchy.refit_order();
+        let refit_order = upload::<u32>(device, "refit order", &order, &mut bytes)?;
+        Ok(Self {
+            nodes,
+            vertices,
+            triangles,
+            bodies,
+            root: hierarchy.root(),
+            refit_order,
+            rows,
+            margin: hierarchy.margin,
+            counts: SceneCounts {
+                vertices: packed.vertices.len(),
+                triangles: packed.triangles.len(),
+                bodies: packed.bodies.len(),
+            },
+            bytes,
+        })
+    }
+
+    /// The vertices, 32 bytes each: position and unit normal as six floats, then eight bytes that
+    /// are not used. A host may write them, and then has to record
+    /// [`SceneRefit::fit`](crate::SceneRefit::fit).
+    #[must_use]
+    pub fn vertices(&self) -> &wgpu::Buffer {
+        &self.vertices
+    }
+
+    /// The nodes of the hierarchy, 32 bytes each: the lowest corner of the box as three floats; the
+    /// index of the left child, which the right one follows, or for a leaf its primitive; the
+    /// highest corner; and 1 for a leaf, else 0.
+    #[must_use]
+    pub fn nodes(&self) -> &wgpu::Buffer {
+        &self.nodes
+    }
+
+    /// Memory of the device that they occupy, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// A storage buffer of these elements, or of one that is never read where there are none.
+fn upload<T: Pod>(
+    device: &wgpu::Device,
+    what: &'static str,
+    elements: &[T],
+    total: &mut u64,
+) -> Result<wgpu::Buffer, RendererError> {
+    let bytes = size_of_val(elements).max(size_of::<T>()) as u64;
+    fits(device, what, bytes)?;
+    *total += bytes;
+    let nothing = [T::zeroed()];
+    let contents = if elements.is_empty() {
+        &nothing
+    } else {
+        elements
+    };
+    let copies = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+    let usage = wgpu::BufferUsages::STORAGE | copies;
+    filled_buffer(device, what, usage, bytemuck::cast_slice(contents))
+}
+
+/// Refuses a storage buffer that the device cannot bind whole.
+pub(crate) fn fits(device: &wgpu::Device, what: &'static str, bytes: u64) -> Result<(), GpuError> {
+    let limits = device.limits();
+    let limit = limits
+        .max_storage_buffer_binding_size
+        .min(limits.max_buffer_size);
+    if bytes > limit {
+        return Err(GpuError::BufferTooLarge { what, bytes, limit });
+    }
+    Ok(())
+}

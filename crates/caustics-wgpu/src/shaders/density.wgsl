@@ -1,0 +1,265 @@
+// A photon's footprint as a density over its receiver's tangent plane: covariance, kernel, gates.
+// CPU twins: `footprint.rs`, `footprint_kernel.rs` and `covariance.rs` of caustics-render.
+
+// 0 Gaussian, 1 ellipse (Epanechnikov), 2 disc, 3 tent: as `FootprintKernel::ALL` has them.
+override FOOTPRINT_KERNEL: u32 = 0u;
+
+const KERNEL_GAUSSIAN: u32 = 0u;
+const KERNEL_ELLIPSE: u32 = 1u;
+const KERNEL_DISC: u32 = 2u;
+
+const MIN_INCIDENCE: f32 = 0.05;
+const MIN_NORMAL_COSINE: f32 = 0.5;
+const PLANE_DISTANCE: f32 = 0.3;
+const MAX_SLIDE: f32 = 2.0;
+const GAUSSIAN_CUT: f32 = 9.0;
+// sqrt(6): the radius at which the ellipse and the tent have variance 1.
+const WIDE_REACH: f32 = 2.4494897;
+
+// What one thread keeps of a footprint while it prepares it.
+struct Density {
+    center: vec3<f32>,
+    normal: vec3<f32>,
+    incoming: vec3<f32>,
+    // Dot products with these are coordinates in standard deviations.
+    u_gradient: vec3<f32>,
+    v_gradient: vec3<f32>,
+    // Two axes of one standard deviation in the plane.
+    axis_u: vec3<f32>,
+    axis_v: vec3<f32>,
+    // Flux over area and incident cosine.
+    strength: vec3<f32>,
+    is_valid: bool,
+}
+
+// A prepared footprint as memory holds it. Rust mirror: `GpuDensity`, 64 bytes.
+struct StoredDensity {
+    center: vec3<f32>,
+    // Octahedral, two signed 16-bit parts.
+    normal: u32,
+    u_gradient: vec3<f32>,
+    incoming: u32,
+    v_gradient: vec3<f32>,
+    // How far before its plane it lights, in metres.
+    reach: f32,
+    strength: vec3<f32>,
+    // Free for the pass that stores it.
+    tag: u32,
+}
+
+// A symmetric matrix in the tangent plane's basis: xx, xy, yy.
+alias Covariance = vec3<f32>;
+
+fn is_finite_number(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+}
+
+fn is_finite_vector(v: vec3<f32>) -> bool {
+    return is_finite_number(v.x) && is_finite_number(v.y) && is_finite_number(v.z);
+}
+
+// Duff et al. 2017, as glam has it, so that both sides factor the same matrix.
+fn tangent_of(n: vec3<f32>) -> vec3<f32> {
+    let s = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (s + n.z);
+    return vec3<f32>(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x);
+}
+
+fn bitangent_of(n: vec3<f32>) -> vec3<f32> {
+    let s = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (s + n.z);
+    return vec3<f32>(n.x * n.y * a, s + n.y * n.y * a, -n.y);
+}
+
+fn encode_octahedral(v: vec3<f32>) -> u32 {
+    let p = v.xy / (abs(v.x) + abs(v.y) + abs(v.z));
+    let signs = select(vec2<f32>(-1.0), vec2<f32>(1.0), p >= vec2<f32>(0.0));
+    let folded = (1.0 - abs(p.yx)) * signs;
+    return pack2x16snorm(select(p, folded, v.z < 0.0));
+}
+
+fn decode_octahedral(packed: u32) -> vec3<f32> {
+    let p = unpack2x16snorm(packed);
+    let z = 1.0 - abs(p.x) - abs(p.y);
+    let signs = select(vec2<f32>(-1.0), vec2<f32>(1.0), p >= vec2<f32>(0.0));
+    let folded = (1.0 - abs(p.yx)) * signs;
+    return normalize(vec3<f32>(select(p, folded, z < 0.0), z));
+}
+
+fn kernel_cut() -> f32 {
+    switch FOOTPRINT_KERNEL {
+        case 0u: { return GAUSSIAN_CUT; }
+        case 1u: { return 6.0; }
+        case 2u: { return 4.0; }
+        default: { return 12.0; }
+    }
+}
+
+// Extent along each axis, in standard deviations.
+fn kernel_reach() -> f32 {
+    switch FOOTPRINT_KERNEL {
+        case 0u: { return 3.0; }
+        case 2u: { return 2.0; }
+        default: { return WIDE_REACH; }
+    }
+}
+
+// The farthest that light gets along any direction: the tent has corners beyond the ellipse.
+fn kernel_outer_reach() -> f32 {
+    return select(kernel_reach(), 3.4641016, FOOTPRINT_KERNEL > KERNEL_DISC);
+}
+
+fn kernel_pixel_variance() -> f32 {
+    return select(0.25, 1.0 / 12.0, FOOTPRINT_KERNEL == KERNEL_GAUSSIAN);
+}
+
+// The kernel's value in its middle, its largest.
+fn kernel_peak() -> f32 {
+    switch FOOTPRINT_KERNEL {
+        case 0u: { return 0.1609428; }
+        case 1u: { return 0.10610330; }
+        case 2u: { return 0.07957747; }
+        default: { return 0.16666667; }
+    }
+}
+
+// The kernel at coordinates in standard deviations; its integral is 1.
+fn kernel_density(u: f32, v: f32) -> f32 {
+    let squared = u * u + v * v;
+    switch FOOTPRINT_KERNEL {
+        case 0u: {
+            // exp(-squared / 32) by its series, to the 16th power.
+            let y = squared * (1.0 / 32.0);
+            let series = 1.0 - y * (1.0 - y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0)))));
+            let second = series * series;
+            let fourth = second * second;
+            let eighth = fourth * fourth;
+            return select(0.0, 0.1609428 * (eighth * eighth), squared < GAUSSIAN_CUT);
+        }
+        case 1u: { return max(1.0 - squared / 6.0, 0.0) * 0.10610330; }
+        case 2u: { return select(0.0, 0.07957747, squared < 4.0); }
+        default: {
+            let tents = max(vec2<f32>(1.0) - abs(vec2<f32>(u, v)) / WIDE_REACH, vec2<f32>(0.0));
+            return tents.x * tents.y / 6.0;
+        }
+    }
+}
+
+fn covariance_add(c: Covariance, weight: f32, x: f32, y: f32) -> Covariance {
+    return c + weight * vec3<f32>(x * x, x * y, y * y);
+}
+
+// The shorter and the longer variance.
+fn covariance_eigenvalues(c: Covariance) -> vec2<f32> {
+    let mean = 0.5 * (c.x + c.z);
+    let half = 0.5 * (c.x - c.z);
+    let spread = sqrt(half * half + c.y * c.y);
+    return vec2<f32>(max(mean - spread, 0.0), mean + spread);
+}
+
+fn covariance_of_axes(
+    axis_u: vec3<f32>,
+    axis_v: vec3<f32>,
+    normal: vec3<f32>,
+    scale: f32,
+    max_anisotropy: f32,
+) -> Covariance {
+    let tangent = tangent_of(normal);
+    let bitangent = bitangent_of(normal);
+    var c = vec3<f32>(0.0);
+    c = covariance_add(c, scale * scale, dot(axis_u, tangent), dot(axis_u, bitangent));
+    c = covariance_add(c, scale * scale, dot(axis_v, tangent), dot(axis_v, bitangent));
+    // A limit of 0 stands for none: shaders need not know infinity.
+    if max_anisotropy > 0.0 {
+        let bounds = covariance_eigenvalues(c);
+        let squared = max_anisotropy * max_anisotropy;
+        if max_anisotropy <= 1.0 {
+            c = vec3<f32>(bounds.y, 0.0, bounds.y);
+        } else if bounds.x < bounds.y / squared {
+            let widened = (bounds.y - squared * bounds.x) / (squared - 1.0);
+            c += vec3<f32>(widened, 0.0, widened);
+        }
+    }
+    if FOOTPRINT_KERNEL == KERNEL_DISC {
+        let bounds = covariance_eigenvalues(c);
+        let variance = sqrt(bounds.x * bounds.y);
+        c = vec3<f32>(variance, 0.0, variance);
+    }
+    return c;
+}
+
+fn density_spread(
+    center: vec3<f32>,
+    normal: vec3<f32>,
+    incoming: vec3<f32>,
+    flux: vec3<f32>,
+    c: Covariance,
+) -> Density {
+    var d: Density;
+    d.center = center;
+    d.normal = normal;
+    d.incoming = incoming;
+    let tangent = tangent_of(normal);
+    let bitangent = bitangent_of(normal);
+    let xx = sqrt(c.x);
+    let xy = c.y / xx;
+    let yy = sqrt(max(c.z - xy * xy, 1e-6 * c.z));
+    let area = xx * yy;
+    d.u_gradient = tangent / xx;
+    d.v_gradient = (bitangent - (xy / xx) * tangent) / yy;
+    let incidence = dot(incoming, normal);
+    if incidence < -MIN_INCIDENCE {
+        d.u_gradient -= normal * (dot(incoming, d.u_gradient) / incidence);
+        d.v_gradient -= normal * (dot(incoming, d.v_gradient) / incidence);
+    }
+    d.axis_u = xx * tangent + xy * bitangent;
+    d.axis_v = yy * bitangent;
+    d.strength = flux / (area * max(-incidence, MIN_INCIDENCE));
+    d.is_valid = c.x > 0.0 && yy > 0.0 && area > 0.0 && is_finite_number(xx)
+        && is_finite_number(yy) && is_finite_number(area) && is_finite_vector(d.strength);
+    return d;
+}
+
+// No point farther from the center than this belongs to the footprint.
+fn density_radius(d: Density) -> f32 {
+    let r = kernel_reach();
+    return r * sqrt(dot(d.axis_u, d.axis_u) + dot(d.axis_v, d.axis_v));
+}
+
+fn density_reach(d: Density) -> f32 {
+    let cosine = -dot(d.incoming, d.normal);
+    return density_radius(d) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
+}
+
+fn density_store(d: Density, tag: u32) -> StoredDensity {
+    var stored: StoredDensity;
+    stored.center = d.center;
+    stored.normal = encode_octahedral(d.normal);
+    stored.u_gradient = d.u_gradient;
+    stored.incoming = encode_octahedral(d.incoming);
+    stored.v_gradient = d.v_gradient;
+    stored.reach = density_reach(d);
+    stored.strength = d.strength;
+    stored.tag = tag;
+    return stored;
+}
+
+// Kernel and cosine that a stored density has at a point of a surface with unit `normal`, where it
+// passes the gates; times the strength it is an irradiance.
+fn density_weight(
+    stored: StoredDensity,
+    plane: vec3<f32>,
+    incoming: vec3<f32>,
+    position: vec3<f32>,
+    normal: vec3<f32>,
+) -> f32 {
+    let relative = position - stored.center;
+    let off = dot(relative, plane);
+    let alike = dot(normal, plane);
+    let lowest = select(0.0, -PLANE_DISTANCE * stored.reach, alike >= MIN_NORMAL_COSINE);
+    if off < lowest || off > stored.reach {
+        return 0.0;
+    }
+    let kernel = kernel_density(dot(relative, stored.u_gradient), dot(relative, stored.v_gradient));
+    return kernel * max(-dot(normal, incoming), 0.0);
+}

@@ -1,0 +1,147 @@
+// How a ray changes with the parameters of its emission (Igehy 1999). Twin: differential.rs in
+// caustics-trace.
+
+struct Differential {
+    position: array<vec3<f32>, PARAMETERS>,
+    direction: array<vec3<f32>, PARAMETERS>,
+}
+
+// On a plane at `distance` along `direction`.
+fn transferred(
+    before: Differential,
+    direction: vec3<f32>,
+    distance: f32,
+    plane_normal: vec3<f32>,
+) -> Differential {
+    var result = before;
+    let along = dot(direction, plane_normal);
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let moved = before.position[i] + distance * before.direction[i];
+        let corrected = moved - dot(moved, plane_normal) / along * direction;
+        if along != 0.0 && all_finite(corrected) {
+            result.position[i] = corrected;
+        } else {
+            result.position[i] = moved;
+        }
+    }
+    return result;
+}
+
+// The matrix times the vector, summed in the twin's order.
+fn turned(matrix: mat3x3<f32>, v: vec3<f32>) -> vec3<f32> {
+    return matrix[0] * v.x + matrix[1] * v.y + matrix[2] * v.z;
+}
+
+// After mirror reflection; `turn` takes a displacement to the change of the normal.
+fn reflected(
+    before: Differential,
+    direction: vec3<f32>,
+    normal: vec3<f32>,
+    turn: mat3x3<f32>,
+) -> Differential {
+    var result = before;
+    let along = dot(direction, normal);
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let change = before.direction[i];
+        let bend = turned(turn, before.position[i]);
+        let along_change = dot(change, normal) + dot(direction, bend);
+        result.direction[i] = change - 2.0 * (along * bend + along_change * normal);
+    }
+    return result;
+}
+
+// After refraction; `eta` is the index left over the index entered.
+fn refracted(
+    before: Differential,
+    direction: vec3<f32>,
+    refracted_direction: vec3<f32>,
+    normal: vec3<f32>,
+    eta: f32,
+    turn: mat3x3<f32>,
+) -> Differential {
+    var result = before;
+    let along = dot(direction, normal);
+    let along_refracted = min(dot(refracted_direction, normal), -SMALLEST_NORMAL);
+    let mu = eta * along - along_refracted;
+    let mu_slope = eta - eta * eta * along / along_refracted;
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let change = before.direction[i];
+        let bend = turned(turn, before.position[i]);
+        let along_change = dot(change, normal) + dot(direction, bend);
+        result.direction[i] = eta * change - (mu * bend + mu_slope * along_change * normal);
+    }
+    return result;
+}
+
+struct Bounded {
+    differential: Differential,
+    shortened: bool,
+}
+
+fn bounded(before: Differential, limit: f32) -> Bounded {
+    var result = Bounded(before, false);
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let change = before.direction[i];
+        let size = largest(abs(change));
+        if !all_finite(change) {
+            result.differential.direction[i] = vec3(0.0);
+            result.shortened = true;
+        } else if size > limit || length_of(change) > limit {
+            // Scaled first: the square of a large derivative overflows.
+            let scaled = change / size;
+            result.differential.direction[i] = scaled * (limit / length_of(scaled));
+            result.shortened = true;
+        }
+        if !all_finite(before.position[i]) {
+            result.differential.position[i] = vec3(0.0);
+            result.shortened = true;
+        }
+    }
+    return result;
+}
+
+fn scaled_by(before: Differential, factor: f32) -> Differential {
+    var result = before;
+    for (var i = 0u; i < PARAMETERS; i++) {
+        result.position[i] *= factor;
+        result.direction[i] *= factor;
+    }
+    return result;
+}
+
+// The axes of the footprint in the plane of `normal`.
+fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2> {
+    if PARAMETERS == 2u {
+        return array(at_end.position[0], at_end.position[1]);
+    }
+    let tangents = tangents_of(normal);
+    var scale = 0.0;
+    for (var i = 0u; i < PARAMETERS; i++) {
+        scale = max(scale, largest(abs(at_end.position[i])));
+    }
+    if scale == 0.0 {
+        return array(vec3(0.0), vec3(0.0));
+    }
+    var xx = 0.0;
+    var xy = 0.0;
+    var yy = 0.0;
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let moved = at_end.position[i] / scale;
+        let x = dot(moved, tangents.first);
+        let y = dot(moved, tangents.second);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    // The columns of the covariance's Cholesky factor.
+    let x = sqrt(xx);
+    var shear = 0.0;
+    if x > 0.0 {
+        shear = xy / x;
+    }
+    let y = sqrt(max(yy - shear * shear, 0.0));
+    return array(
+        scale * (x * tangents.first + shear * tangents.second),
+        scale * y * tangents.second,
+    );
+}

@@ -1,0 +1,14 @@
+// Light that landed on a receiver. Twin: `FootprintRecord` in footprint_record.rs.
+
+struct FootprintRecord {
+    position: vec3<f32>,
+    flux_r: f32,
+    axis_u: vec3<f32>,
+    flux_g: f32,
+    axis_v: vec3<f32>,
+    flux_b: f32,
+    incoming: vec3<f32>,
+    object: u32,
+    normal: vec3<f32>,
+    photon: u32,
+}

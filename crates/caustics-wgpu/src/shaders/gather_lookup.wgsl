@@ -1,0 +1,29 @@
+// The irradiance of the caustics at any point, in W/m²: `caustics_irradiance`.
+// CPU twin: `FootprintGather::irradiance` of caustics-render.
+
+@group(0) @binding(0) var<uniform> caustics_grid: GatherGrid;
+@group(0) @binding(1) var<storage, read> caustics_densities: array<StoredDensity>;
+@group(0) @binding(2) var<storage, read> caustics_lists: array<u32>;
+@group(0) @binding(3) var<storage, read> caustics_entries: array<u32>;
+@group(0) @binding(4) var<storage, read> caustics_counts: array<u32>;
+
+// At a point of a surface with unit `normal`, by the light that falls on the side of the normal.
+fn caustics_irradiance(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    var sizes = caustics_counts[6];
+    while sizes != 0u {
+        let size = countTrailingZeros(sizes);
+        sizes &= sizes - 1u;
+        let cell = gather_cell(position, caustics_grid.cell * exp2(f32(size)));
+        let list = gather_list(cell, size, caustics_grid.lists);
+        let room = arrayLength(&caustics_entries);
+        let last = min(caustics_lists[list + 1u], room);
+        for (var i = caustics_lists[list]; i < last; i++) {
+            let stored = caustics_densities[caustics_entries[i]];
+            let incoming = decode_octahedral(stored.incoming);
+            let plane = decode_octahedral(stored.normal);
+            sum += density_weight(stored, plane, incoming, position, normal) * stored.strength;
+        }
+    }
+    return sum;
+}

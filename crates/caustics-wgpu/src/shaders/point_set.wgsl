@@ -1,0 +1,119 @@
+// The sample that a photon is made from. Twins: point_set.rs, grid.rs, rank1_lattice.rs and
+// kronecker.rs in caustics-sampling; `EmissionSample` in caustics-trace.
+
+struct EmissionSample {
+    point: vec2<f32>,
+    // The edges of the cell that the point stands for.
+    spacing: array<vec2<f32>, 2>,
+    // Chooses the place on an area light.
+    place: vec2<f32>,
+}
+
+struct GridCell {
+    corner: vec2<f32>,
+    size: vec2<f32>,
+    row: u32,
+    column: u32,
+}
+
+fn grid_cell(count: u32, rows: u32, index: u32) -> GridCell {
+    let short_columns = count / rows;
+    let longer_rows = count % rows;
+    let in_longer_rows = longer_rows * (short_columns + 1u);
+    let is_longer = index < in_longer_rows;
+    let columns = short_columns + select(0u, 1u, is_longer);
+    let after = select(index - in_longer_rows, index, is_longer);
+    let row = after / columns + select(longer_rows, 0u, is_longer);
+    let column = after % columns;
+    return GridCell(
+        vec2(f32(column) / f32(columns), f32(index - column) / f32(count)),
+        vec2(1.0 / f32(columns), f32(columns) / f32(count)),
+        row,
+        column,
+    );
+}
+
+fn spread_bits(x: u32) -> u32 {
+    var bits = x & 0xffffu;
+    bits = (bits | (bits << 8u)) & 0x00ff00ffu;
+    bits = (bits | (bits << 4u)) & 0x0f0f0f0fu;
+    bits = (bits | (bits << 2u)) & 0x33333333u;
+    return (bits | (bits << 1u)) & 0x55555555u;
+}
+
+fn z_order(x: u32, y: u32) -> u32 {
+    return spread_bits(x) | (spread_bits(y) << 1u);
+}
+
+fn rotated(point: vec2<f32>, shift: vec2<f32>) -> vec2<f32> {
+    let moved = point + shift;
+    return moved - select(vec2(0.0), vec2(1.0), moved >= vec2(1.0));
+}
+
+// `index` times a step of 64 bits, plus a half, as a fraction of 2^64.
+fn kronecker(index: u32, step_high: u32, step_low: u32) -> f32 {
+    return unit_from_bits(index * step_high + multiply_high(index, step_low) + 0x80000000u);
+}
+
+fn lattice_place(multiple: u32, count: u32) -> f32 {
+    return unit_nearest(f32(2u * multiple + 1u) / f32(2u * count));
+}
+
+fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
+    let count = trace.emitters[emitter].points;
+    let place = trace.emitters[emitter].place;
+    let edge = 1.0 / sqrt(f32(count));
+    var result: EmissionSample;
+    result.spacing = array(vec2(edge, 0.0), vec2(0.0, edge));
+    if trace.sequence == SEQUENCE_GRID {
+        let cell = grid_cell(count, trace.emitters[emitter].rows, index);
+        let point = cell.corner + place * cell.size;
+        result.point = vec2(unit_nearest(point.x), unit_nearest(point.y));
+        result.spacing = array(vec2(cell.size.x, 0.0), vec2(0.0, cell.size.y));
+        let order = z_order(cell.column, cell.row);
+        result.place = vec2(sobol(order, 4u), sobol(order, 5u));
+    } else if trace.sequence == SEQUENCE_HALTON {
+        result.point = vec2(halton(index, 0u), halton(index, 1u));
+        result.place = vec2(halton(index, 2u), halton(index, 3u));
+    } else if trace.sequence == SEQUENCE_SOBOL {
+        result.point = vec2(sobol(index, 0u), sobol(index, 1u));
+        result.place = vec2(sobol(index, 2u), sobol(index, 3u));
+    } else {
+        if trace.sequence == SEQUENCE_FIBONACCI {
+            let generator = trace.emitters[emitter].generator;
+            let product = multiply_modulo(index, generator, count);
+            result.point = vec2(lattice_place(index, count), lattice_place(product, count));
+            let basis = trace.emitters[emitter].basis;
+            result.spacing = array(basis.xy, basis.zw);
+        } else {
+            result.point = vec2(
+                kronecker(index, 0xc13fa9a9u, 0x02a6328fu),
+                kronecker(index, 0x91e10da5u, 0xc79e7b1du),
+            );
+        }
+        result.point = rotated(result.point, place);
+        result.place = vec2(sobol(index, 4u), sobol(index, 5u));
+    }
+    return result;
+}
+
+// The number, in the whole set, of the point of an emitter's photon. Twin: lattice.rs in
+// caustics-trace.
+fn point_number(emitter: u32, index: u32) -> u32 {
+    let first = trace.emitters[emitter].first_span;
+    var low = 0u;
+    var high = trace.emitters[emitter].span_count;
+    if high == 0u {
+        return index;
+    }
+    // The last run that does not begin after it.
+    while low + 1u < high {
+        let middle = (low + high) / 2u;
+        if emission_lists[first + 2u * middle + 1u] <= index {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return emission_lists[first + 2u * low] + (index - emission_lists[first + 2u * low + 1u]);
+}

@@ -1,0 +1,68 @@
+// Sorts footprints into the tiles that they touch, by counting: one pass counts each tile's, one
+// writes their numbers into the tile's list.
+
+@group(0) @binding(0) var<uniform> view: SplatView;
+@group(0) @binding(1) var<storage, read> places: array<SplatPlace>;
+@group(0) @binding(2) var<storage, read> tile_starts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> tile_cursors: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> pairs: array<u32>;
+@group(0) @binding(5) var<storage, read_write> counts: SplatCounts;
+@group(0) @binding(6) var<uniform> step: SplatStep;
+
+// Counts, for each tile, the footprints that may light a pixel of it.
+@compute @workgroup_size(256)
+fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= atomicLoad(&counts.footprints) {
+        return;
+    }
+    let place = places[id.x];
+    let level = view.levels[place.level];
+    let rows = tile_rows(place);
+    for (var row = rows.x; row < rows.y; row++) {
+        let columns = tile_columns(place, row);
+        for (var column = columns.x; column < columns.y; column++) {
+            atomicAdd(&tile_cursors[level.w + row * level.z + column], 1u);
+        }
+    }
+}
+
+// Writes each footprint's number into the lists of its tiles.
+@compute @workgroup_size(256)
+fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= atomicLoad(&counts.footprints) {
+        return;
+    }
+    let place = places[id.x];
+    let level = view.levels[place.level];
+    let rows = tile_rows(place);
+    let room = arrayLength(&pairs);
+    let each = round_pairs(room, arrayLength(&places));
+    // Where all tiles' lists end: most often they fit in one round.
+    let last = view.levels[LEVELS - 1u];
+    let tiles = last.w + last.z * ((last.y + TILE - 1u) / TILE);
+    if step.round * each > tile_starts[tiles] {
+        return;
+    }
+    var made = 0u;
+    var dropped = 0u;
+    for (var row = rows.x; row < rows.y; row++) {
+        let columns = tile_columns(place, row);
+        for (var column = columns.x; column < columns.y; column++) {
+            let tile = level.w + row * level.z + column;
+            if round_of(tile_starts[tile], each) != step.round {
+                continue;
+            }
+            let at = tile_starts[tile] - step.round * each + atomicAdd(&tile_cursors[tile], 1u);
+            if at < room {
+                pairs[at] = id.x;
+            } else {
+                dropped += 1u;
+            }
+            made += 1u;
+        }
+    }
+    atomicAdd(&counts.pairs, made);
+    if dropped > 0u {
+        atomicAdd(&counts.dropped_pairs, dropped);
+    }
+}

@@ -1,0 +1,115 @@
+use crate::error_scope::storage_buffer;
+use crate::renderer_error::RendererError;
+use crate::splat_options::SplatOptions;
+use crate::splat_view::LEVELS;
+use crate::{FootprintRecord, GpuError, PhotonBuffers};
+
+/// Bytes of a `StoredDensity` of `shaders/density.wgsl`.
+pub(crate) const DENSITY_BYTES: u64 = 64;
+
+/// Bytes of a `SplatPlace` of `shaders/splat_place.wgsl`.
+const PLACE_BYTES: u64 = 40;
+
+/// Footprints that one workgroup prepares.
+pub(crate) const GROUP: u32 = 256;
+
+/// What the views of a frame use one after the other.
+#[derive(Clone, Debug)]
+pub(crate) struct SplatScratch {
+    /// Footprints of one batch that there is room for.
+    pub(crate) capacity: u32,
+    pub(crate) tiles: u32,
+    pub(crate) densities: wgpu::Buffer,
+    pub(crate) places: wgpu::Buffer,
+    pub(crate) tile_counts: wgpu::Buffer,
+    pub(crate) tile_starts: wgpu::Buffer,
+    /// Pairs of footprints and tiles, or the order in which quads are drawn.
+    pub(crate) pairs: wgpu::Buffer,
+    pub(crate) peak_sums: wgpu::Buffer,
+    pub(crate) draws: wgpu::Buffer,
+}
+
+impl SplatScratch {
+    pub(crate) fn new(
+        device: &wgpu::Device,
+        capacity: u32,
+        tiles: u32,
+        pairs: u64,
+        layers: u32,
+    ) -> Result<Self, RendererError> {
+        let limits = device.limits();
+        let limit = limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size);
+        let make = |what: &'static str, bytes: u64, usage| {
+            if bytes > limit {
+                return Err(GpuError::BufferTooLarge { what, bytes, limit });
+            }
+            Ok(storage_buffer(device, what, bytes, usage))
+        };
+        let (count, tiles_bytes) = (u64::from(capacity), 4 * u64::from(tiles + 1));
+        let none = wgpu::BufferUsages::empty();
+        Ok(Self {
+            capacity,
+            tiles,
+            densities: make("prepared footprints", count * DENSITY_BYTES, none)?,
+            places: make("places of footprints", count * PLACE_BYTES, none)?,
+            tile_counts: make("counts of tiles", tiles_bytes, wgpu::BufferUsages::COPY_DST)?,
+            tile_starts: make("starts of tiles", tiles_bytes, none)?,
+            pairs: make(
+                "pairs of footprints and tiles",
+                4 * pairs.min(limit / 4),
+                none,
+            )?,
+            peak_sums: make(
+                "peaks of footprints",
+                4 * u64::from(capacity.div_ceil(GROUP)),
+                none,
+            )?,
+            draws: make(
+                "draws of quads",
+                16 * LEVELS as u64 * u64::from(layers + 1),
+                wgpu::BufferUsages::INDIRECT,
+            )?,
+        })
+    }
+
+    /// Room for pairs: for tiles as the options say, and for quads an order.
+    pub(crate) fn pairs(options: &SplatOptions, capacity: u32) -> u64 {
+        match options.method {
+            crate::SplatMethod::Tiles => {
+                u64::from(capacity.max(4096)) * u64::from(options.pairs_per_footprint)
+            }
+            crate::SplatMethod::Quads => u64::from(capacity),
+        }
+    }
+}
+
+/// Footprints in buffers of the GPU: [`FootprintRecord`]s, and a buffer whose first word is their
+/// number. More than one binding holds are given as several batches.
+#[derive(Clone, Copy, Debug)]
+pub struct FootprintBatch<'a> {
+    /// The records; its usage includes `STORAGE`.
+    pub records: &'a wgpu::Buffer,
+    /// Their number; its usage includes `STORAGE`.
+    pub count: &'a wgpu::Buffer,
+}
+
+impl<'a> From<&'a PhotonBuffers> for FootprintBatch<'a> {
+    /// The landings of traced photons.
+    fn from(photons: &'a PhotonBuffers) -> Self {
+        Self {
+            records: photons.records(),
+            count: photons.counters(),
+        }
+    }
+}
+
+impl FootprintBatch<'_> {
+    /// Records that there is room for.
+    #[must_use]
+    pub fn capacity(&self) -> u32 {
+        let records = self.records.size() / size_of::<FootprintRecord>() as u64;
+        u32::try_from(records).unwrap_or(u32::MAX)
+    }
+}

@@ -1,0 +1,402 @@
+use std::collections::HashMap;
+use std::f32::consts::PI;
+
+use caustics_accel::Intersect;
+use caustics_geometry::Frame;
+use caustics_sampling::warp::Cone;
+use caustics_sampling::{CounterRng, Grid, Rank1Lattice, Rotation, Sequence};
+use caustics_scene::{Light, World};
+use caustics_trace::{
+    AreaSurface, Branching, EmissionBatch, EmissionDomain, EmissionPlan, MediumStack, TraceOptions,
+};
+use glam::{DVec3, Vec2, Vec3};
+
+use crate::GpuError;
+use crate::body_order::{BodyOrder, at_most};
+use crate::gpu_scene::SPHERE_BIT;
+use crate::trace_params::{Emitter as Mirror, MAX_EMITTERS, NO_CASTER};
+
+/// The largest flux of a photon, in units of the ledger's sums.
+const LARGEST_FLUX: f32 = (1 << 30) as f32;
+
+/// The photons of all lights, as the shaders emit them: the same light for the same number as
+/// [`trace_photons`](caustics_trace::trace_photons) emits with the same options.
+#[derive(Clone, Debug)]
+pub struct TracePlan {
+    pub(crate) emitters: Vec<PlannedEmitter>,
+    /// What the emitters refer to: cumulative areas, runs of points, projection maps.
+    pub(crate) lists: Vec<u32>,
+    pub(crate) options: TraceOptions,
+    pub(crate) flux_scale: f32,
+    power: DVec3,
+    photons: u32,
+}
+
+/// An emitter's photons.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlannedEmitter {
+    /// As the shader is told, but with the first emitter of the light among all.
+    pub(crate) mirror: Mirror,
+    /// Parameters of its rays: 2 or 4.
+    pub(crate) dimensions: u32,
+}
+
+impl TracePlan {
+    /// The most photons of one plan.
+    pub const MAX_PHOTONS: u32 = 1 << 30;
+
+    /// Aims the lights and shares the photons among them. `intersect` finds the media around them,
+    /// and follows the few photons by which the others are shared.
+    ///
+    /// # Errors
+    /// [`GpuError::Options`] for options out of range, [`GpuError::Unsupported`] for
+    /// [`Refinement`](caustics_trace::Refinement), and [`GpuError::TooMany`].
+    pub fn new<I: Intersect + ?Sized>(
+        world: &World,
+        intersect: &I,
+        options: &TraceOptions,
+    ) -> Result<Self, GpuError> {
+        let plan = EmissionPlan::new(world, intersect, options)?;
+        Self::of(world, &plan, options)
+    }
+
+    /// The photons of a plan of the CPU, made for the same world and options: for hosts that keep one
+    /// from frame to frame.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of(
+        world: &World,
+        emission: &EmissionPlan,
+        options: &TraceOptions,
+    ) -> Result<Self, GpuError> {
+        options.validate()?;
+        if options.refinement.levels > 0 {
+            let what = "photons whose lattice is refined";
+            return Err(GpuError::Unsupported { what });
+        }
+        let photons = emission.batches().iter().map(|it| u64::from(it.count()));
+        at_most("photons", photons.sum(), Self::MAX_PHOTONS.into())?;
+        let order = BodyOrder::new(world)?;
+        let mut plan = Self {
+            emitters: Vec::with_capacity(emission.batches().len()),
+            lists: Vec::new(),
+            options: *options,
+            flux_scale: 1.0,
+            power: DVec3::ZERO,
+            photons: 0,
+        };
+        let mut cumulative = HashMap::new();
+        for of_light in emission.lights() {
+            plan.power += of_light
+                .first()
+                .map_or(DVec3::ZERO, |it| it.emitter().power());
+            let first_of_light = plan.emitters.len() as u32;
+            for batch in of_light {
+                let Some(mut mirror) = mirror(world, &order, batch.emitter().domain())? else {
+                    continue;
+                };
+                mirror.first_of_light = first_of_light;
+                plan.set_samples(&mut mirror, batch);
+                set_media(&mut mirror, &batch.media(), &order);
+                if let EmissionDomain::Area {
+                    surface: AreaSurface::Object { emitter, .. },
+                    ..
+                } = *batch.emitter().domain()
+                {
+                    let light = &world.emitters()[emitter as usize];
+                    let lists = &mut plan.lists;
+                    mirror.first_cumulative = *cumulative.entry(emitter).or_insert_with(|| {
+                        let first = lists.len() as u32;
+                        lists.extend(light.cumulative_area().iter().map(|it| it.to_bits()));
+                        first
+                    });
+                }
+                plan.photons += mirror.count;
+                plan.emitters.push(PlannedEmitter {
+                    mirror,
+                    dimensions: batch.emitter().dimensions() as u32,
+                });
+            }
+            let emitters = plan.emitters.len() as u64 - u64::from(first_of_light);
+            at_most("emitters of one light", emitters, MAX_EMITTERS as u64)?;
+        }
+        if plan.lists.is_empty() {
+            // A buffer has at least one word.
+            plan.lists.push(0);
+        }
+        let fluxes = plan.emitters.iter().map(|it| largest_flux(&it.mirror));
+        let strongest = fluxes.fold(0.0, f32::max);
+        if strongest > 0.0 {
+            // A power of two, so that scaling does not round.
+            plan.flux_scale = (LARGEST_FLUX / strongest).log2().floor().exp2();
+        }
+        Ok(plan)
+    }
+
+    /// How many photons there are, of all lights together: numbers 0 and up.
+    #[must_use]
+    pub fn photons(&self) -> u32 {
+        self.photons
+    }
+
+    /// Everything that the lights emit, in watts: what is aimed and what is not.
+    #[must_use]
+    pub fn power(&self) -> DVec3 {
+        self.power
+    }
+
+    /// Sets what an emitter's photons are made from.
+    fn set_samples(&mut self, mirror: &mut Mirror, batch: &EmissionBatch) {
+        mirror.first = self.photons;
+        mirror.count = batch.count();
+        mirror.points = batch.points().count();
+        mirror.share = 1.0 / mirror.points as f32;
+        mirror.stream = batch.stream();
+        mirror.caster = batch.emitter().caster().unwrap_or(NO_CASTER);
+        if let Some(spans) = batch.spans() {
+            mirror.first_span = self.lists.len() as u32;
+            self.lists
+                .extend(spans.flat_map(|(first, before)| [first, before]));
+            mirror.span_count = (self.lists.len() as u32 - mirror.first_span) / 2;
+        }
+        mirror.first_map = Mirror::NO_MAP;
+        if let Some(map) = batch.map() {
+            mirror.first_map = self.lists.len() as u32;
+            self.lists.extend_from_slice(map.words());
+        }
+        sample_from(mirror, &self.options);
+    }
+
+    pub(crate) fn sequence(&self) -> u32 {
+        match self.options.sequence {
+            Sequence::Halton => 0,
+            Sequence::Sobol => 1,
+            Sequence::Fibonacci => 3,
+            Sequence::Kronecker => 4,
+            _ => 2,
+        }
+    }
+
+    pub(crate) fn branching(&self) -> u32 {
+        match self.options.branching {
+            Branching::Roulette => 0,
+            Branching::SplitFirst => 1,
+            _ => 2,
+        }
+    }
+}
+
+/// What the shader is told of an emitter's rays; `None` where it has none.
+fn mirror(
+    world: &World,
+    order: &BodyOrder,
+    domain: &EmissionDomain,
+) -> Result<Option<Mirror>, GpuError> {
+    let everywhere = Mirror {
+        // Cones wider than all directions, inside which the light does not fall off.
+        inner_cosine: -2.0,
+        outer_cosine: -3.0,
+        target_radius: -1.0,
+        side: 1.0,
+        ..Mirror::default()
+    };
+    let mirror = match domain {
+        EmissionDomain::Sphere { light, origin } => Mirror {
+            kind: Mirror::SPHERE,
+            origin: origin.to_array(),
+            solid_angle: 4.0 * PI,
+            ..with_light(everywhere, light)
+        },
+        EmissionDomain::Cone {
+            light,
+            origin,
+            frame,
+            cone,
+        } => Mirror {
+            kind: Mirror::CONE,
+            origin: origin.to_array(),
+            ..in_frame(with_light(everywhere, light), frame, Some(cone))
+        },
+        EmissionDomain::Rectangle {
+            corner,
+            edges: [along, across],
+            direction,
+            irradiance,
+        } => Mirror {
+            kind: Mirror::RECTANGLE,
+            origin: corner.to_array(),
+            tangent: along.to_array(),
+            bitangent: across.to_array(),
+            axis: direction.to_array(),
+            intensity: irradiance.to_array(),
+            area: along.length() * across.length(),
+            ..everywhere
+        },
+        EmissionDomain::Area { surface, target } => {
+            let (center, radius) = target.map_or((Vec3::ZERO, -1.0), |it| (it.center, it.radius));
+            Mirror {
+                kind: Mirror::AREA,
+                intensity: surface.radiance(world).to_array(),
+                area: surface.area(world),
+                target_center: center.to_array(),
+                target_radius: radius,
+                ..from_surface(everywhere, world, order, surface)?
+            }
+        }
+        EmissionDomain::Nothing => return Ok(None),
+        _ => {
+            return Err(GpuError::Unsupported {
+                what: "a kind of light",
+            });
+        }
+    };
+    Ok(Some(mirror))
+}
+
+fn with_light(mirror: Mirror, light: &Light) -> Mirror {
+    match *light {
+        Light::Point { intensity, .. } => Mirror {
+            intensity: intensity.to_array(),
+            ..mirror
+        },
+        Light::Spot {
+            direction,
+            intensity,
+            inner_cos,
+            outer_cos,
+            ..
+        } => Mirror {
+            intensity: intensity.to_array(),
+            spot_axis: direction.to_array(),
+            inner_cosine: inner_cos,
+            outer_cosine: outer_cos,
+            ..mirror
+        },
+        _ => mirror,
+    }
+}
+
+fn in_frame(mirror: Mirror, frame: &Frame, cone: Option<&Cone>) -> Mirror {
+    Mirror {
+        tangent: frame.tangent.to_array(),
+        bitangent: frame.bitangent.to_array(),
+        axis: frame.normal.to_array(),
+        height: cone.map_or(0.0, |it| it.height()),
+        solid_angle: cone.map_or(0.0, |it| it.solid_angle()),
+        ..mirror
+    }
+}
+
+fn from_surface(
+    mirror: Mirror,
+    world: &World,
+    order: &BodyOrder,
+    surface: &AreaSurface,
+) -> Result<Mirror, GpuError> {
+    Ok(match surface {
+        AreaSurface::Rectangle {
+            corner,
+            edges: [along, across],
+            normal,
+            ..
+        } => Mirror {
+            surface: Mirror::SURFACE_RECTANGLE,
+            origin: corner.to_array(),
+            tangent: along.to_array(),
+            bitangent: across.to_array(),
+            axis: normal.to_array(),
+            ..mirror
+        },
+        AreaSurface::Disc {
+            center,
+            frame,
+            radius,
+            ..
+        } => Mirror {
+            surface: Mirror::SURFACE_DISC,
+            origin: center.to_array(),
+            radius: *radius,
+            ..in_frame(mirror, frame, None)
+        },
+        AreaSurface::Cap {
+            center,
+            radius,
+            frame,
+            cone,
+            ..
+        } => Mirror {
+            surface: Mirror::SURFACE_CAP,
+            origin: center.to_array(),
+            radius: *radius,
+            ..in_frame(mirror, frame, Some(cone))
+        },
+        AreaSurface::Object { emitter, front } => {
+            let light = &world.emitters()[*emitter as usize];
+            let primitives = light.primitives();
+            let first_primitive = if world.sphere(primitives.start).is_some() {
+                SPHERE_BIT | order.bodies[light.object() as usize]
+            } else {
+                primitives.start
+            };
+            Mirror {
+                surface: Mirror::SURFACE_OBJECT,
+                side: if *front { 1.0 } else { -1.0 },
+                first_primitive,
+                primitive_count: primitives.len() as u32,
+                ..mirror
+            }
+        }
+        _ => {
+            return Err(GpuError::Unsupported {
+                what: "a kind of surface that shines",
+            });
+        }
+    })
+}
+
+/// Sets what chooses the samples; its `points` are set.
+fn sample_from(mirror: &mut Mirror, options: &TraceOptions) {
+    let rotation = if options.seed == 0 {
+        Rotation::NONE
+    } else {
+        Rotation::new(options.seed)
+    };
+    let mut place = rotation.shift();
+    match options.sequence {
+        Sequence::Grid => {
+            mirror.rows = Grid::new(mirror.points).rows();
+            place = if options.seed == 0 {
+                Vec2::splat(0.5)
+            } else {
+                CounterRng::new(options.seed, 0).next_vec2()
+            };
+        }
+        Sequence::Fibonacci => {
+            let lattice = Rank1Lattice::fibonacci(mirror.points);
+            mirror.generator = lattice.generator();
+            let [first, second] = lattice.basis();
+            mirror.basis = [first.x, first.y, second.x, second.y];
+        }
+        _ => {}
+    }
+    mirror.place = place.to_array();
+}
+
+fn set_media(mirror: &mut Mirror, media: &MediumStack, order: &BodyOrder) {
+    for (place, &object) in media.objects().iter().enumerate() {
+        mirror.media[place / 2] |= order.bodies[object as usize] << (16 * (place % 2));
+        mirror.media_count += 1;
+    }
+}
+
+/// What no photon of the emitter exceeds in any channel, in watts.
+fn largest_flux(mirror: &Mirror) -> f32 {
+    let measure = match mirror.kind {
+        Mirror::RECTANGLE => mirror.area,
+        // The widest cone, and more than the cosine-weighted hemisphere.
+        Mirror::AREA => 2.0 * PI * mirror.area,
+        _ => mirror.solid_angle,
+    };
+    Vec3::from(mirror.intensity).max_element() * measure * mirror.share
+}

@@ -1,0 +1,252 @@
+//! Photons traced on both sides, and what differs.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use caustics_scene::gltf::load_path;
+use caustics_scene::{BvhOptions, SceneIntersector, World};
+use caustics_trace::{
+    EmissionPlan, EnergyLedger, Fate, Photon, PhotonTrail, TraceOptions, trace_photon,
+};
+use caustics_wgpu::glam::Vec3;
+use caustics_wgpu::{
+    FootprintRecord, PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, TracePlan, wgpu,
+};
+
+use super::{shared_device, words};
+
+/// The names of the ten scenes, with the ending.
+pub(crate) const SCENES: [&str; 10] = [
+    "p01_sphere.glb",
+    "p02_sphere_box.glb",
+    "p03_cognac.glb",
+    "p04_sphere_in_box.glb",
+    "p05_brass_ring.glb",
+    "p06_wave_plane.glb",
+    "p07_pool.glb",
+    "p08_square.glb",
+    "p09_cornell.glb",
+    "p10_torus_cube.glb",
+];
+
+/// A world and what finds the hits in it.
+pub(crate) struct Stage {
+    pub(crate) world: World,
+    pub(crate) rays: SceneIntersector,
+}
+
+impl Stage {
+    pub(crate) fn new(world: World) -> Self {
+        let rays = world.intersector(&BvhOptions::default()).unwrap();
+        Self { world, rays }
+    }
+
+    /// One of the [`SCENES`].
+    pub(crate) fn load(name: &str) -> Self {
+        let path = [env!("CARGO_MANIFEST_DIR"), "../../tests/scenes", name];
+        let path: PathBuf = path.iter().collect();
+        Self::new(World::new(&load_path(path).unwrap().scene).unwrap())
+    }
+
+    pub(crate) fn plan(&self, options: &TraceOptions) -> TracePlan {
+        TracePlan::new(&self.world, &self.rays, options).unwrap()
+    }
+}
+
+/// The trails of all photons by the CPU, in the order of their numbers.
+pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
+    let Stage { world, rays } = stage;
+    let plan = EmissionPlan::new(world, rays, options).unwrap();
+    let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
+    (0..plan.count()).map(trail).collect()
+}
+
+/// The shared device, and the tracer that its tests share.
+pub(crate) fn shared_tracer()
+-> Option<(&'static (wgpu::Device, wgpu::Queue), &'static PhotonTracer)> {
+    static TRACER: OnceLock<PhotonTracer> = OnceLock::new();
+    let gpu = shared_device()?;
+    Some((gpu, TRACER.get_or_init(|| PhotonTracer::new(&gpu.0))))
+}
+
+/// What one photon stored, in order: a hash of the path, and the record.
+pub(crate) type Stored = Vec<(u32, FootprintRecord)>;
+
+/// What the GPU traced.
+pub(crate) struct Traced {
+    pub(crate) photons: Vec<Stored>,
+    pub(crate) counters: TraceCounters,
+}
+
+/// Traces all photons of a plan in one batch, with room for this many records.
+pub(crate) fn trace_on_gpu(
+    (device, queue): &(wgpu::Device, wgpu::Queue),
+    tracer: &PhotonTracer,
+    stage: &Stage,
+    plan: &TracePlan,
+    capacity: u32,
+) -> Traced {
+    let scene = SceneBuffers::new(device, &stage.world).unwrap();
+    let buffers = PhotonBuffers::new(device, plan.photons(), capacity).unwrap();
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    buffers.clear(&mut encoder);
+    let all = 0..plan.photons();
+    tracer
+        .trace(device, &mut encoder, &scene, plan, all, &buffers)
+        .unwrap();
+    queue.submit([encoder.finish()]);
+    read(device, queue, plan, &buffers)
+}
+
+/// Reads back what a batch that holds all photons has stored.
+pub(crate) fn read(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    plan: &TracePlan,
+    buffers: &PhotonBuffers,
+) -> Traced {
+    let counters = TraceCounters::new(&words(device, queue, buffers.counters()), plan).unwrap();
+    let records = words(device, queue, buffers.records());
+    let records: &[FootprintRecord] = bytemuck::cast_slice(&records);
+    let links = words(device, queue, buffers.links());
+    let links_of_records = &links[buffers.photons() as usize..];
+    let stored = |photon: u32| {
+        let mut stored = Vec::new();
+        let mut next = links[photon as usize];
+        while next != 0 {
+            let record = next as usize - 1;
+            assert_eq!(records[record].photon, photon, "record {record}");
+            stored.push((links_of_records[2 * record + 1], records[record]));
+            next = links_of_records[2 * record];
+        }
+        stored.reverse();
+        stored
+    };
+    let photons: Vec<Stored> = (0..plan.photons()).map(stored).collect();
+    let reachable: usize = photons.iter().map(Vec::len).sum();
+    assert_eq!(reachable, counters.stored as usize);
+    Traced { photons, counters }
+}
+
+/// How the photons of both sides differ.
+#[derive(Debug, Default)]
+pub(crate) struct Difference {
+    /// Photons whose path is not the same, by cause.
+    pub(crate) paths: BTreeMap<&'static str, Vec<usize>>,
+    /// The largest distance between landing points, relative to the size of the scene.
+    pub(crate) position: f32,
+    /// The largest relative difference of a flux.
+    pub(crate) flux: f32,
+    /// The largest difference of a footprint's axis, relative to the longer one.
+    pub(crate) axes: f32,
+    /// The largest difference of a unit vector.
+    pub(crate) directions: f32,
+    /// Records whose every bit is the same, of so many on the same paths.
+    pub(crate) equal_records: (usize, usize),
+}
+
+impl Difference {
+    pub(crate) fn between(world: &World, trails: &[PhotonTrail], traced: &Traced) -> Self {
+        assert_eq!(trails.len(), traced.photons.len());
+        let size = world.bounds().diagonal().length();
+        let mut difference = Self::default();
+        for (number, (trail, stored)) in trails.iter().zip(&traced.photons).enumerate() {
+            let paths: Vec<u32> = stored.iter().map(|(path, _)| *path).collect();
+            if paths == trail.paths {
+                for ((_, record), photon) in stored.iter().zip(&trail.photons) {
+                    difference.compare(number as u32, photon, record, size);
+                }
+            } else {
+                let cause = if paths.len() == trail.paths.len() {
+                    "other objects or events"
+                } else {
+                    "another number of parts"
+                };
+                difference.paths.entry(cause).or_default().push(number);
+            }
+        }
+        difference
+    }
+
+    fn compare(&mut self, number: u32, photon: &Photon, record: &FootprintRecord, size: f32) {
+        let expected = FootprintRecord::numbered(photon, number);
+        assert_eq!(record.object, expected.object);
+        let distance = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).distance(b.into());
+        let flux = record.flux() - photon.flux;
+        let longer = photon.axes[0].length().max(photon.axes[1].length());
+        let axes =
+            distance(record.axis_u, expected.axis_u).max(distance(record.axis_v, expected.axis_v));
+        let directions = distance(record.incoming, expected.incoming)
+            .max(distance(record.normal, expected.normal));
+        let position = distance(record.position, expected.position) / size;
+        self.position = larger(self.position, position);
+        self.flux = larger(
+            self.flux,
+            flux.abs().max_element() / photon.flux.max_element(),
+        );
+        if axes != 0.0 {
+            self.axes = larger(self.axes, axes / longer);
+        }
+        self.directions = larger(self.directions, directions);
+        self.equal_records.0 += usize::from(*record == expected);
+        self.equal_records.1 += 1;
+    }
+
+    /// How many photons took another path.
+    pub(crate) fn other_paths(&self) -> usize {
+        self.paths.values().map(Vec::len).sum()
+    }
+
+    /// What exceeds the promise: one photon of a thousand may take another path; the others land
+    /// within 10⁻⁴ of the scene's size, with a flux within 10⁻⁴ and a footprint within 10⁻³.
+    pub(crate) fn beyond_promise(&self, photons: usize) -> Vec<String> {
+        let mut beyond = Vec::new();
+        if 1000 * self.other_paths() > photons {
+            let causes = self.paths.iter().map(|(cause, all)| (cause, all.len()));
+            beyond.push(format!("paths: {:?}", causes.collect::<Vec<_>>()));
+        }
+        for (what, found, limit) in [
+            ("position", self.position, 1e-4),
+            ("flux", self.flux, 1e-4),
+            ("axes", self.axes, 1e-3),
+            ("directions", self.directions, 1e-3),
+        ] {
+            if found.is_nan() || found > limit {
+                beyond.push(format!("{what}: {found:e}"));
+            }
+        }
+        beyond
+    }
+}
+
+/// The larger, or the one that is not a number.
+fn larger(a: f32, b: f32) -> f32 {
+    if a >= b || a.is_nan() { a } else { b }
+}
+
+/// The sum of the trails' ledgers, and what was not aimed.
+pub(crate) fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedger {
+    let mut ledger = EnergyLedger::default();
+    for trail in trails {
+        ledger.merge(&trail.ledger);
+    }
+    let overlap = ledger.entry(Fate::Overlap).flux;
+    ledger.emit_unaimed(plan.power() - (ledger.emitted().flux - overlap));
+    ledger
+}
+
+/// Lines of two ledgers whose counts differ by more than a thousandth of the photons or whose flux
+/// by more than 10⁻⁴ of what was emitted.
+pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -> Vec<String> {
+    let emitted = a.emitted().flux.max_element();
+    let unlike = |fate: &Fate| {
+        let (one, other) = (a.entry(*fate), b.entry(*fate));
+        let flux = (one.flux - other.flux).abs().max_element();
+        1000 * one.count.abs_diff(other.count) > photons as u64 || flux > 1e-4 * emitted
+    };
+    let lines = Fate::ALL.into_iter().filter(unlike);
+    lines
+        .map(|fate| format!("{}: {:?}, {:?}", fate.name(), a.entry(fate), b.entry(fate)))
+        .collect()
+}

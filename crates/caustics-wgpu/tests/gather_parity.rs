@@ -1,0 +1,100 @@
+//! The GPU's gather against the CPU's, for the same photons and points.
+
+mod stage;
+
+use caustics_render::{FootprintGather, FootprintKernel, FootprintOptions};
+use caustics_wgpu::glam::Vec3;
+use caustics_wgpu::{
+    FootprintBatch, Gather, GatherCounts, GatherOptions, GatherPoint, SplatKernel, wgpu,
+};
+use stage::{Stage, TestError, buffer, device_with, read_buffer, upload};
+
+#[test]
+fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
+    let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
+        return Ok(());
+    };
+    let kernels = SplatKernel::ALL.into_iter().zip(FootprintKernel::ALL);
+    let cases = ["p03_cognac", "p07_pool", "p09_cornell"]
+        .map(|name| (name, SplatKernel::Gaussian, FootprintKernel::Gaussian))
+        .into_iter()
+        .chain(kernels.map(|(kernel, twin)| ("p01_sphere", kernel, twin)));
+    for (name, kernel, twin) in cases {
+        let stage = Stage::load(name, 10_000)?;
+        let options = FootprintOptions {
+            kernel: twin,
+            ..FootprintOptions::default()
+        };
+        let expected = FootprintGather::new(&stage.photons, &options)?;
+        let options = GatherOptions {
+            kernel,
+            least_extent: expected.least_extent(),
+            most_extent: 1e7 * expected.least_extent(),
+            capacity: stage.photons.len() as u32,
+            ..GatherOptions::default()
+        };
+        let gather = Gather::new(&device, &options)?;
+        let (records, count) = upload(&device, &queue, &stage.photons);
+
+        // What the camera sees, and where photons landed.
+        let picture = stage.picture(&stage.camera, [100, 75]);
+        let seen = picture.seen.iter().flatten();
+        let points: Vec<GatherPoint> = seen
+            .map(|it| (it.position, it.normal))
+            .chain(
+                stage
+                    .photons
+                    .iter()
+                    .step_by(7)
+                    .map(|it| (it.position, it.normal)),
+            )
+            .map(|(position, normal)| GatherPoint {
+                position: position.to_array(),
+                normal: normal.to_array(),
+                ..GatherPoint::default()
+            })
+            .collect();
+        let points_buffer = buffer(&device, &queue, bytemuck::cast_slice(&points));
+        let found = buffer(&device, &queue, &vec![255; 16 * points.len()]);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let batch = FootprintBatch {
+            records: &records,
+            count: &count,
+        };
+        gather.build(&device, &mut encoder, &batch)?;
+        gather.evaluate(&device, &mut encoder, &points_buffer, &found)?;
+        queue.submit([encoder.finish()]);
+
+        let counts = read_buffer(&device, &queue, gather.counts(), GatherCounts::BYTES)?;
+        let counts = GatherCounts::from_bytes(&counts).ok_or("too short")?;
+        assert_eq!(
+            u64::from(counts.stored),
+            expected.stats().stored,
+            "{counts:?}"
+        );
+        assert_eq!(u64::from(counts.invalid), expected.stats().invalid);
+        assert_eq!(counts.dropped_entries, 0);
+        let found = read_buffer(&device, &queue, &found, found.size())?;
+        let found: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&found);
+        let (mut off, mut sum, mut exact, mut lit) = (0.0f64, 0.0f64, 0, 0);
+        for (point, found) in points.iter().zip(&found) {
+            let expected = expected.irradiance(point.position.into(), point.normal.into());
+            let difference = (Vec3::new(found[0], found[1], found[2]) - expected).abs();
+            off += f64::from(difference.element_sum());
+            sum += f64::from(expected.element_sum());
+            lit += u32::from(expected != Vec3::ZERO);
+            exact += u32::from(
+                expected != Vec3::ZERO && difference.element_sum() < 1e-3 * expected.element_sum(),
+            );
+        }
+        println!(
+            "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
+            off / sum
+        );
+        // Footprints hundreds of times longer than wide are sensitive to rounding: their width is
+        // what is left of a difference. Few points are lit by them.
+        assert!(off < 0.01 * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(f64::from(exact) > 0.97 * f64::from(lit), "{exact} of {lit}");
+    }
+    Ok(())
+}

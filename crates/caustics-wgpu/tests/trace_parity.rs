@@ -1,0 +1,75 @@
+//! On the ten scenes the GPU traces the photons that the CPU traces, one by one.
+
+mod common;
+
+use caustics_trace::TraceOptions;
+
+use common::tracing::{
+    Difference, SCENES, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
+};
+
+const PHOTONS: u32 = 100_000;
+
+#[test]
+fn the_same_photons_land_in_the_same_places() {
+    let Some((gpu, tracer)) = shared_tracer() else {
+        return;
+    };
+    let options = TraceOptions {
+        photons: PHOTONS,
+        ..TraceOptions::default()
+    };
+    let mut beyond = Vec::new();
+    for name in SCENES {
+        let stage = Stage::load(name);
+        let plan = stage.plan(&options);
+        let traced = trace_on_gpu(gpu, tracer, &stage, &plan, 4 * PHOTONS);
+        let trails = trails_by_cpu(&stage, &options);
+        let difference = Difference::between(&stage.world, &trails, &traced);
+        println!(
+            "{name}: {} of {PHOTONS} on other paths, {} of {} records equal in every bit, \
+             position {:.0e}, flux {:.0e}, axes {:.0e}",
+            difference.other_paths(),
+            difference.equal_records.0,
+            difference.equal_records.1,
+            difference.position,
+            difference.flux,
+            difference.axes,
+        );
+        for (cause, photons) in &difference.paths {
+            println!("  {cause}: {photons:?}");
+        }
+        let ledger = ledger_of(&trails, &plan);
+        let of_scene = difference
+            .beyond_promise(trails.len())
+            .into_iter()
+            .chain(unlike_lines(&traced.counters.ledger, &ledger, trails.len()));
+        beyond.extend(of_scene.map(|it| format!("{name}: {it}")));
+        assert_eq!(traced.counters.crowded.count, 0, "{name}");
+        assert!(traced.counters.ledger.imbalance() < 1e-6, "{name}");
+        assert!(difference.equal_records.1 > 1000, "{name}");
+    }
+    assert_eq!(beyond, Vec::<String>::new());
+}
+
+#[test]
+fn other_photons_are_told_apart() {
+    let Some((gpu, tracer)) = shared_tracer() else {
+        return;
+    };
+    let stage = Stage::load("p03_cognac.glb");
+    let options = TraceOptions {
+        photons: 2_000,
+        ..TraceOptions::default()
+    };
+    let plan = stage.plan(&options);
+    let traced = trace_on_gpu(gpu, tracer, &stage, &plan, 10_000);
+    // The points of the lattice lie elsewhere in their cells.
+    let other = TraceOptions { seed: 1, ..options };
+    let trails = trails_by_cpu(&stage, &other);
+    let difference = Difference::between(&stage.world, &trails, &traced);
+    assert_eq!(difference.beyond_promise(trails.len()).len(), 5);
+    // A ledger of fewer photons.
+    let ledger = ledger_of(&trails[..1_000], &plan);
+    assert!(!unlike_lines(&traced.counters.ledger, &ledger, trails.len()).is_empty());
+}
