@@ -90,7 +90,7 @@ impl SplatSteps {
         for (index, place) in bytes.chunks_exact_mut(STEP_STRIDE as usize).enumerate() {
             let step = SplatStep {
                 level: (index % LEVELS) as u32,
-                is_first: u32::from(index / LEVELS % 2 == 0),
+                is_first: u32::from((index / LEVELS).is_multiple_of(2)),
                 layers,
                 round: (index / (2 * LEVELS)) as u32,
             };
