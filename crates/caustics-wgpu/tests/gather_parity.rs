@@ -9,6 +9,10 @@ use caustics_wgpu::{
 };
 use stage::{Stage, TestError, buffer, device_with, read_buffer, upload};
 
+/// Footprints hundreds of times longer than wide are sensitive to rounding, on either side: their
+/// width is what is left of a difference of squares.
+const MAX_ANISOTROPY: f32 = 100.0;
+
 #[test]
 fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
     let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
@@ -23,11 +27,13 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         let stage = Stage::load(name, 10_000)?;
         let options = FootprintOptions {
             kernel: twin,
+            max_anisotropy: MAX_ANISOTROPY,
             ..FootprintOptions::default()
         };
         let expected = FootprintGather::new(&stage.photons, &options)?;
         let options = GatherOptions {
             kernel,
+            max_anisotropy: MAX_ANISOTROPY,
             least_extent: expected.least_extent(),
             most_extent: 1e7 * expected.least_extent(),
             capacity: stage.photons.len() as u32,
@@ -91,9 +97,7 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
-        // Footprints hundreds of times longer than wide are sensitive to rounding: their width is
-        // what is left of a difference. Few points are lit by them.
-        assert!(off < 0.01 * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(off < 5e-3 * sum, "{name} {kernel:?}: {off} of {sum}");
         assert!(f64::from(exact) > 0.97 * f64::from(lit), "{exact} of {lit}");
     }
     Ok(())
