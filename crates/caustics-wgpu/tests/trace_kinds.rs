@@ -37,7 +37,7 @@ fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &T
     let mut beyond = difference.beyond_promise(trails.len());
     beyond.extend(unlike_lines(&traced.counters.ledger, &ledger, trails.len()));
     assert_eq!(beyond, Vec::<String>::new(), "{name}");
-    assert!(difference.equal_records.1 > 100, "{name}");
+    assert!(difference.equal_records.1 > 40, "{name}");
 }
 
 fn with_tracer(test: impl Fn(&Gpu, &PhotonTracer)) {

@@ -1,8 +1,12 @@
 //! What the tests of this crate share.
 #![allow(dead_code, reason = "each test file takes what it needs")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot be set up has failed"
+)]
 
-pub mod scenes;
-pub mod tracing;
+pub(crate) mod scenes;
+pub(crate) mod tracing;
 
 use std::sync::OnceLock;
 
@@ -15,7 +19,7 @@ use caustics_wgpu::wgpu;
 ///
 /// # Panics
 /// Without an adapter where `CI` is set.
-pub fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
+pub(crate) fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
     limited_device(wgpu::Limits::default())
 }
 
@@ -23,7 +27,7 @@ pub fn test_device() -> Option<(wgpu::Device, wgpu::Queue)> {
 ///
 /// # Panics
 /// Without an adapter where `CI` is set.
-pub fn limited_device(limits: wgpu::Limits) -> Option<(wgpu::Device, wgpu::Queue)> {
+pub(crate) fn limited_device(limits: wgpu::Limits) -> Option<(wgpu::Device, wgpu::Queue)> {
     let device = pollster::block_on(device(limits));
     if let Err(error) = &device {
         assert!(std::env::var_os("CI").is_none(), "no GPU adapter: {error}");
@@ -37,7 +41,7 @@ pub fn limited_device(limits: wgpu::Limits) -> Option<(wgpu::Device, wgpu::Queue
 ///
 /// # Panics
 /// Without an adapter where `CI` is set.
-pub fn shared_device() -> Option<&'static (wgpu::Device, wgpu::Queue)> {
+pub(crate) fn shared_device() -> Option<&'static (wgpu::Device, wgpu::Queue)> {
     static DEVICE: OnceLock<Option<(wgpu::Device, wgpu::Queue)>> = OnceLock::new();
     DEVICE.get_or_init(test_device).as_ref()
 }
@@ -61,7 +65,7 @@ async fn device(
 }
 
 /// The words of a buffer that may be copied from.
-pub fn words(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
+pub(crate) fn words(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
     let size = buffer.size();
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read back"),

@@ -7,7 +7,7 @@ use caustics_wgpu::glam::{Affine3A, Vec3};
 
 use super::tracing::Stage;
 
-pub fn add(scene: &mut Scene, shape: Shape, at: Vec3, material: Material) {
+pub(crate) fn add(scene: &mut Scene, shape: Shape, at: Vec3, material: Material) {
     let material = scene.add_material(material).unwrap();
     let instance = Instance {
         transform: Affine3A::from_translation(at),
@@ -16,18 +16,18 @@ pub fn add(scene: &mut Scene, shape: Shape, at: Vec3, material: Material) {
     scene.add_instance(instance).unwrap();
 }
 
-pub fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, at: Vec3, material: Material) {
+pub(crate) fn add_mesh(scene: &mut Scene, mesh: TriangleMesh, at: Vec3, material: Material) {
     let shape = Shape::Mesh(scene.add_mesh(mesh));
     add(scene, shape, at, material);
 }
 
-pub fn ball(radius: f32) -> Shape {
+pub(crate) fn ball(radius: f32) -> Shape {
     let center = Vec3::ZERO;
     Shape::Sphere { center, radius }
 }
 
 /// A floor of 8 metres, and nothing that shines.
-pub fn floor() -> Scene {
+pub(crate) fn floor() -> Scene {
     let mut scene = Scene::new();
     let mesh = quad([-4.0, 0.0, 4.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0]).unwrap();
     add_mesh(
@@ -40,18 +40,18 @@ pub fn floor() -> Scene {
 }
 
 /// A floor with a faceted ball of glass.
-pub fn glass() -> Scene {
+pub(crate) fn glass() -> Scene {
     let mut scene = floor();
     let glass = Material::dielectric("glass", 1.5);
     add_mesh(&mut scene, icosphere(0.7, 3).unwrap(), Vec3::Y, glass);
     scene
 }
 
-pub fn lit(mut scene: Scene, light: Light) -> Stage {
+pub(crate) fn lit(mut scene: Scene, light: Light) -> Stage {
     scene.add_light(light).unwrap();
     Stage::new(World::new(&scene).unwrap())
 }
 
-pub fn lamp() -> Light {
+pub(crate) fn lamp() -> Light {
     Light::point([0.4, 3.0, 0.2], [5.0, 4.0, 3.0]).unwrap()
 }

@@ -17,7 +17,7 @@ use caustics_wgpu::{
 use super::{shared_device, words};
 
 /// The names of the ten scenes, with the ending.
-pub const SCENES: [&str; 10] = [
+pub(crate) const SCENES: [&str; 10] = [
     "p01_sphere.glb",
     "p02_sphere_box.glb",
     "p03_cognac.glb",
@@ -31,31 +31,31 @@ pub const SCENES: [&str; 10] = [
 ];
 
 /// A world and what finds the hits in it.
-pub struct Stage {
-    pub world: World,
-    pub rays: SceneIntersector,
+pub(crate) struct Stage {
+    pub(crate) world: World,
+    pub(crate) rays: SceneIntersector,
 }
 
 impl Stage {
-    pub fn new(world: World) -> Self {
+    pub(crate) fn new(world: World) -> Self {
         let rays = world.intersector(&BvhOptions::default()).unwrap();
         Self { world, rays }
     }
 
     /// One of the [`SCENES`].
-    pub fn load(name: &str) -> Self {
+    pub(crate) fn load(name: &str) -> Self {
         let path = [env!("CARGO_MANIFEST_DIR"), "../../tests/scenes", name];
         let path: PathBuf = path.iter().collect();
         Self::new(World::new(&load_path(path).unwrap().scene).unwrap())
     }
 
-    pub fn plan(&self, options: &TraceOptions) -> TracePlan {
+    pub(crate) fn plan(&self, options: &TraceOptions) -> TracePlan {
         TracePlan::new(&self.world, &self.rays, options).unwrap()
     }
 }
 
 /// The trails of all photons by the CPU, in the order of their numbers.
-pub fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
+pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
     let Stage { world, rays } = stage;
     let plan = EmissionPlan::new(world, rays, options).unwrap();
     let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
@@ -63,23 +63,24 @@ pub fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> 
 }
 
 /// The shared device, and the tracer that its tests share.
-pub fn shared_tracer() -> Option<(&'static (wgpu::Device, wgpu::Queue), &'static PhotonTracer)> {
+pub(crate) fn shared_tracer()
+-> Option<(&'static (wgpu::Device, wgpu::Queue), &'static PhotonTracer)> {
     static TRACER: OnceLock<PhotonTracer> = OnceLock::new();
     let gpu = shared_device()?;
     Some((gpu, TRACER.get_or_init(|| PhotonTracer::new(&gpu.0))))
 }
 
 /// What one photon stored, in order: a hash of the path, and the record.
-pub type Stored = Vec<(u32, FootprintRecord)>;
+pub(crate) type Stored = Vec<(u32, FootprintRecord)>;
 
 /// What the GPU traced.
-pub struct Traced {
-    pub photons: Vec<Stored>,
-    pub counters: TraceCounters,
+pub(crate) struct Traced {
+    pub(crate) photons: Vec<Stored>,
+    pub(crate) counters: TraceCounters,
 }
 
 /// Traces all photons of a plan in one batch, with room for this many records.
-pub fn trace_on_gpu(
+pub(crate) fn trace_on_gpu(
     (device, queue): &(wgpu::Device, wgpu::Queue),
     tracer: &PhotonTracer,
     stage: &Stage,
@@ -99,7 +100,7 @@ pub fn trace_on_gpu(
 }
 
 /// Reads back what a batch that holds all photons has stored.
-pub fn read(
+pub(crate) fn read(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     plan: &TracePlan,
@@ -130,23 +131,23 @@ pub fn read(
 
 /// How the photons of both sides differ.
 #[derive(Debug, Default)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Photons whose path is not the same, by cause.
-    pub paths: BTreeMap<&'static str, Vec<usize>>,
+    pub(crate) paths: BTreeMap<&'static str, Vec<usize>>,
     /// The largest distance between landing points, relative to the size of the scene.
-    pub position: f32,
+    pub(crate) position: f32,
     /// The largest relative difference of a flux.
-    pub flux: f32,
+    pub(crate) flux: f32,
     /// The largest difference of a footprint's axis, relative to the longer one.
-    pub axes: f32,
+    pub(crate) axes: f32,
     /// The largest difference of a unit vector.
-    pub directions: f32,
+    pub(crate) directions: f32,
     /// Records whose every bit is the same, of so many on the same paths.
-    pub equal_records: (usize, usize),
+    pub(crate) equal_records: (usize, usize),
 }
 
 impl Difference {
-    pub fn between(world: &World, trails: &[PhotonTrail], traced: &Traced) -> Self {
+    pub(crate) fn between(world: &World, trails: &[PhotonTrail], traced: &Traced) -> Self {
         assert_eq!(trails.len(), traced.photons.len());
         let size = world.bounds().diagonal().length();
         let mut difference = Self::default();
@@ -193,13 +194,13 @@ impl Difference {
     }
 
     /// How many photons took another path.
-    pub fn other_paths(&self) -> usize {
+    pub(crate) fn other_paths(&self) -> usize {
         self.paths.values().map(Vec::len).sum()
     }
 
     /// What exceeds the promise: one photon of a thousand may take another path; the others land
     /// within 10⁻⁴ of the scene's size, with a flux within 10⁻⁴ and a footprint within 10⁻³.
-    pub fn beyond_promise(&self, photons: usize) -> Vec<String> {
+    pub(crate) fn beyond_promise(&self, photons: usize) -> Vec<String> {
         let mut beyond = Vec::new();
         if 1000 * self.other_paths() > photons {
             let causes = self.paths.iter().map(|(cause, all)| (cause, all.len()));
@@ -225,7 +226,7 @@ fn larger(a: f32, b: f32) -> f32 {
 }
 
 /// The sum of the trails' ledgers, and what was not aimed.
-pub fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedger {
+pub(crate) fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedger {
     let mut ledger = EnergyLedger::default();
     for trail in trails {
         ledger.merge(&trail.ledger);
@@ -237,7 +238,7 @@ pub fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedger {
 
 /// Lines of two ledgers whose counts differ by more than a thousandth of the photons or whose flux
 /// by more than 10⁻⁴ of what was emitted.
-pub fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -> Vec<String> {
+pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -> Vec<String> {
     let emitted = a.emitted().flux.max_element();
     let unlike = |fate: &Fate| {
         let (one, other) = (a.entry(*fate), b.entry(*fate));
