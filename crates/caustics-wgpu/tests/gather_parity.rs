@@ -9,8 +9,7 @@ use caustics_wgpu::{
 };
 use stage::{Stage, TestError, buffer, device_with, read_buffer, upload};
 
-/// Footprints hundreds of times longer than wide are sensitive to rounding, on either side: their
-/// width is what is left of a difference of squares.
+/// Footprints hundreds of times longer than wide are sensitive to rounding, on either side.
 const MAX_ANISOTROPY: f32 = 100.0;
 
 #[test]
@@ -97,7 +96,7 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
-        assert!(off < 5e-3 * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(off < 0.01 * sum, "{name} {kernel:?}: {off} of {sum}");
         assert!(f64::from(exact) > 0.97 * f64::from(lit), "{exact} of {lit}");
     }
     Ok(())
