@@ -135,7 +135,7 @@ fn gather_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = list_starts[list] + atomicAdd(&list_counts[list], 1u);
         atomicAdd(&counts[4], 1u);
         if at < arrayLength(&entries) {
-            entries[at] = id.x;
+            entries[at] = id.x | (cells.size << GATHER_SIZE_SHIFT);
         } else {
             atomicAdd(&counts[5], 1u);
         }
