@@ -9,9 +9,6 @@ use caustics_wgpu::{
 };
 use stage::{Stage, TestError, buffer, device_with, read_buffer, upload};
 
-/// Footprints hundreds of times longer than wide are sensitive to rounding, on either side.
-const MAX_ANISOTROPY: f32 = 100.0;
-
 #[test]
 fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
     let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
@@ -26,13 +23,11 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         let stage = Stage::load(name, 10_000)?;
         let options = FootprintOptions {
             kernel: twin,
-            max_anisotropy: MAX_ANISOTROPY,
             ..FootprintOptions::default()
         };
         let expected = FootprintGather::new(&stage.photons, &options)?;
         let options = GatherOptions {
             kernel,
-            max_anisotropy: MAX_ANISOTROPY,
             least_extent: expected.least_extent(),
             most_extent: 1e7 * expected.least_extent(),
             capacity: stage.photons.len() as u32,
@@ -96,8 +91,14 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
-        assert!(off < 3e-3 * sum, "{name} {kernel:?}: {off} of {sum}");
-        assert!(f64::from(exact) > 0.97 * f64::from(lit), "{exact} of {lit}");
+        // A disc is constant up to its edge: rounding decides which side a point on it is.
+        let tolerance = if kernel == SplatKernel::Disc {
+            5e-3
+        } else {
+            1e-3
+        };
+        assert!(off < tolerance * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(f64::from(exact) > 0.99 * f64::from(lit), "{exact} of {lit}");
     }
     Ok(())
 }
