@@ -11,6 +11,9 @@ use crate::engine::Look;
 use crate::headless::{device, read, read_texture, reading_buffer};
 use crate::stage::Stage;
 
+/// Passes by name, and the milliseconds that each took.
+pub type PassMilliseconds = Vec<(&'static str, f64)>;
+
 /// A frame, read back.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -27,7 +30,7 @@ pub struct Snapshot {
     /// What was recorded for the caustics.
     pub work: RecordedWork,
     /// Milliseconds of each of their passes, where the device can tell; passes of one name together.
-    pub times: Vec<(&'static str, f64)>,
+    pub times: PassMilliseconds,
 }
 
 impl Snapshot {
@@ -105,9 +108,9 @@ impl FrameNotes {
         &self,
         device: &wgpu::Device,
         frame: &PreparedFrame,
-    ) -> Result<(SplatStats, Vec<(&'static str, f64)>), Failure> {
+    ) -> Result<(SplatStats, PassMilliseconds), Failure> {
         let stats = SplatStats::from_bytes(&read(device, &self.stats)?).ok_or("no stats")?;
-        let mut sums: Vec<(&'static str, f64)> = Vec::new();
+        let mut sums = PassMilliseconds::new();
         if let (Some(times), Some(timestamps)) = (&self.times, frame.timestamps()) {
             for time in timestamps.pass_times(&read(device, times)?) {
                 let milliseconds = 1e-6 * time.nanoseconds;
@@ -147,7 +150,7 @@ pub fn offscreen(
 /// The light that the engine shades with: the first, if there is one that is not a surface.
 #[must_use]
 pub fn main_light(scene: &Scene) -> Option<Light> {
-    scene.lights().first().cloned()
+    scene.lights().first().copied()
 }
 
 /// Writes pixels of four bytes as a PNG.

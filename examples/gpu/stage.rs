@@ -137,7 +137,7 @@ fn relit(scene: &Scene, light: Light) -> Result<Scene, Failure> {
     }
     copy.add_light(light)?;
     for other in scene.lights().iter().skip(1) {
-        copy.add_light(other.clone())?;
+        copy.add_light(*other)?;
     }
     Ok(copy)
 }

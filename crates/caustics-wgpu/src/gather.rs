@@ -95,7 +95,7 @@ pub struct GatherOptions {
     /// The largest extent of a footprint's axis times the scale, in metres: a longer one is
     /// shortened and counted. At least the least, and at most 2^27 times that.
     pub most_extent: f32,
-    /// Footprints that there is room for.
+    /// Footprints that there is room for, at most 2^27.
     pub capacity: u32,
     /// Room for pairs of a footprint and a cell that its box touches, for each footprint: 1 to 8.
     /// In 8 all fit.
@@ -456,6 +456,12 @@ impl GatherOptions {
                 self.most_extent,
                 self.most_extent >= self.least_extent && self.most_extent <= most,
                 "1 to 2^27 times the least",
+            ),
+            (
+                "capacity",
+                self.capacity as f32,
+                self.capacity <= 1 << 27,
+                "at most 2^27",
             ),
             (
                 "entries_per_footprint",

@@ -91,10 +91,14 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
-        // Footprints hundreds of times longer than wide are sensitive to rounding: their width is
-        // what is left of a difference. Few points are lit by them.
-        assert!(off < 0.01 * sum, "{name} {kernel:?}: {off} of {sum}");
-        assert!(f64::from(exact) > 0.97 * f64::from(lit), "{exact} of {lit}");
+        // A disc is constant up to its edge: rounding decides which side a point on it is.
+        let tolerance = if kernel == SplatKernel::Disc {
+            5e-3
+        } else {
+            1e-3
+        };
+        assert!(off < tolerance * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(f64::from(exact) > 0.99 * f64::from(lit), "{exact} of {lit}");
     }
     Ok(())
 }

@@ -79,7 +79,7 @@ impl Orbit {
     }
 
     pub(crate) fn light(&self) -> Light {
-        self.light.clone()
+        self.light
     }
 
     pub(crate) fn look(&self, exposure_ev: f32) -> Result<Look, Failure> {

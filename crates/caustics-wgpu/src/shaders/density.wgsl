@@ -38,13 +38,13 @@ struct StoredDensity {
     // Octahedral, two signed 16-bit parts.
     normal: u32,
     u_gradient: vec3<f32>,
-    incoming: u32,
+    // Octahedral, in full: at grazing incidence the cosine is as small as its error else.
+    incoming_x: f32,
     v_gradient: vec3<f32>,
     // How far before its plane it lights, in metres.
     reach: f32,
     strength: vec3<f32>,
-    // Free for the pass that stores it.
-    tag: u32,
+    incoming_y: f32,
 }
 
 // A symmetric matrix in the tangent plane's basis: xx, xy, yy.
@@ -71,19 +71,30 @@ fn bitangent_of(n: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(n.x * n.y * a, s + n.y * n.y * a, -n.y);
 }
 
-fn encode_octahedral(v: vec3<f32>) -> u32 {
+fn to_octahedral(v: vec3<f32>) -> vec2<f32> {
     let p = v.xy / (abs(v.x) + abs(v.y) + abs(v.z));
     let signs = select(vec2<f32>(-1.0), vec2<f32>(1.0), p >= vec2<f32>(0.0));
     let folded = (1.0 - abs(p.yx)) * signs;
-    return pack2x16snorm(select(p, folded, v.z < 0.0));
+    return select(p, folded, v.z < 0.0);
 }
 
-fn decode_octahedral(packed: u32) -> vec3<f32> {
-    let p = unpack2x16snorm(packed);
+fn from_octahedral(p: vec2<f32>) -> vec3<f32> {
     let z = 1.0 - abs(p.x) - abs(p.y);
     let signs = select(vec2<f32>(-1.0), vec2<f32>(1.0), p >= vec2<f32>(0.0));
     let folded = (1.0 - abs(p.yx)) * signs;
     return normalize(vec3<f32>(select(p, folded, z < 0.0), z));
+}
+
+fn encode_octahedral(v: vec3<f32>) -> u32 {
+    return pack2x16snorm(to_octahedral(v));
+}
+
+fn decode_octahedral(packed: u32) -> vec3<f32> {
+    return from_octahedral(unpack2x16snorm(packed));
+}
+
+fn stored_incoming(stored: StoredDensity) -> vec3<f32> {
+    return from_octahedral(vec2<f32>(stored.incoming_x, stored.incoming_y));
 }
 
 fn kernel_cut() -> f32 {
@@ -231,16 +242,17 @@ fn density_reach(d: Density) -> f32 {
     return density_radius(d) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
 }
 
-fn density_store(d: Density, tag: u32) -> StoredDensity {
+fn density_store(d: Density) -> StoredDensity {
     var stored: StoredDensity;
     stored.center = d.center;
     stored.normal = encode_octahedral(d.normal);
     stored.u_gradient = d.u_gradient;
-    stored.incoming = encode_octahedral(d.incoming);
+    let incoming = to_octahedral(d.incoming);
+    stored.incoming_x = incoming.x;
+    stored.incoming_y = incoming.y;
     stored.v_gradient = d.v_gradient;
     stored.reach = density_reach(d);
     stored.strength = d.strength;
-    stored.tag = tag;
     return stored;
 }
 

@@ -99,7 +99,8 @@ fn gather_count(@builtin(global_invocation_id) id: vec3<u32>) {
     let d = density_of(record);
     if !(d.is_valid && is_finite_vector(record.position)) {
         atomicAdd(&counts[3], 1u);
-        densities[id.x].tag = NO_FOOTPRINT;
+        // Marks it as left out.
+        densities[id.x].reach = -1.0;
         return;
     }
     atomicAdd(&counts[0], 1u);
@@ -107,7 +108,7 @@ fn gather_count(@builtin(global_invocation_id) id: vec3<u32>) {
     atomicAdd(&counts[2], u32(is_shortened(record)));
     let cells = cells_of(d);
     atomicOr(&counts[6], 1u << cells.size);
-    densities[id.x] = density_store(d, cells.size);
+    densities[id.x] = density_store(d);
     for (var corner = 0u; corner < 8u; corner++) {
         let list = list_of(cells, corner);
         if list != NO_FOOTPRINT {
@@ -121,7 +122,7 @@ fn gather_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= min(footprint_count[0], arrayLength(&footprints)) {
         return;
     }
-    if densities[id.x].tag == NO_FOOTPRINT {
+    if densities[id.x].reach < 0.0 {
         return;
     }
     // Anew from the record: what is stored is rounded and might touch other cells.
@@ -134,7 +135,7 @@ fn gather_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = list_starts[list] + atomicAdd(&list_counts[list], 1u);
         atomicAdd(&counts[4], 1u);
         if at < arrayLength(&entries) {
-            entries[at] = id.x;
+            entries[at] = id.x | (cells.size << GATHER_SIZE_SHIFT);
         } else {
             atomicAdd(&counts[5], 1u);
         }

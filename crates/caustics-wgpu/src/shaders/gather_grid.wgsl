@@ -4,6 +4,10 @@
 
 const NO_FOOTPRINT: u32 = 0xffffffffu;
 
+// An entry of a list is a footprint's number, and from this bit on its size: lists are shared by
+// cells of different sizes, and a footprint must be found by its own alone.
+const GATHER_SIZE_SHIFT: u32 = 27u;
+
 // Rust mirror: `GatherGrid`.
 struct GatherGrid {
     // Edge of a cell of the first size, in metres; each next is twice as large.

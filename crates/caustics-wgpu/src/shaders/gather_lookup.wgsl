@@ -19,8 +19,12 @@ fn caustics_irradiance(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
         let room = arrayLength(&caustics_entries);
         let last = min(caustics_lists[list + 1u], room);
         for (var i = caustics_lists[list]; i < last; i++) {
-            let stored = caustics_densities[caustics_entries[i]];
-            let incoming = decode_octahedral(stored.incoming);
+            let entry = caustics_entries[i];
+            if entry >> GATHER_SIZE_SHIFT != size {
+                continue;
+            }
+            let stored = caustics_densities[entry & ((1u << GATHER_SIZE_SHIFT) - 1u)];
+            let incoming = stored_incoming(stored);
             let plane = decode_octahedral(stored.normal);
             sum += density_weight(stored, plane, incoming, position, normal) * stored.strength;
         }

@@ -173,7 +173,7 @@ fn prepare(index: u32) -> f32 {
     place.columns = pixel_range(bounds.low.x, bounds.high.x, stride, level.x);
     place.rows = pixel_range(bounds.low.y, bounds.high.y, stride, level.y);
     places[index] = place;
-    densities[index] = density_store(d, place.level);
+    densities[index] = density_store(d);
     atomicAdd(&counts.by_level[place.level], 1u);
     return max(max(d.strength.x, d.strength.y), d.strength.z) * kernel_peak();
 }

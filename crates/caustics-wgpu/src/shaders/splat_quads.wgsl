@@ -99,7 +99,7 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
     let weight = density_weight(
         stored,
         decode_octahedral(stored.normal),
-        decode_octahedral(stored.incoming),
+        stored_incoming(stored),
         bitcast<vec3<f32>>(texel.xyz),
         decode_octahedral(texel.w),
     );

@@ -147,7 +147,7 @@ fn splat_tiles(
                 if area <= SMALL_AREA {
                     let stored = densities[index];
                     let plane = decode_octahedral(stored.normal);
-                    let incoming = decode_octahedral(stored.incoming);
+                    let incoming = stored_incoming(stored);
                     for (var y = box.z; y < box.w; y++) {
                         let span = row_span(place, box, corner, y);
                         for (var x = span.x; x < span.y; x++) {
@@ -170,7 +170,7 @@ fn splat_tiles(
             for (var i = 0u; i < larges; i++) {
                 let stored = densities[large[i]];
                 let plane = decode_octahedral(stored.normal);
-                let incoming = decode_octahedral(stored.incoming);
+                let incoming = stored_incoming(stored);
                 let weight = density_weight(stored, plane, incoming, position, normal);
                 own += vec3<u32>(unit * stored.strength * weight + 0.5);
             }
