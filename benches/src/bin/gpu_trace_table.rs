@@ -18,7 +18,7 @@ use caustics_wgpu::{PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, Tr
 
 const PATIENCE: Patience = Patience {
     runs: 7,
-    seconds: 5.0,
+    seconds: 4.0,
 };
 
 const SCENES: [&str; 10] = [
