@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// scene.add_instance(Instance::new("cube", Shape::Mesh(cube), glass))?;
 /// let world = World::new(&scene)?;
 /// let mut rays = InstancedIntersector::new(&scene, &world, &BvhOptions::default())?;
-/// let down = Ray::new([0.1, 5.0, 0.2], [0.0, -1.0, 0.0]);
+/// let down = Ray::new([0.125, 5.0, 0.25], [0.0, -1.0, 0.0]);
 /// assert_eq!(rays.closest_hit(&down).map(|hit| hit.t), Some(4.5));
 ///
 /// scene.set_transform(0, Affine3A::from_translation(Vec3::Y))?;
