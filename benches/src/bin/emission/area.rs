@@ -14,8 +14,8 @@ use crate::view::{View, balls, camera_over};
 const PHOTONS: u32 = 1 << 17;
 
 /// Point lights that stand for an area, each with so many photons.
-const PLACES: u32 = 1024;
-const PHOTONS_EACH: u32 = 1024;
+const PLACES: u32 = 256;
+const PHOTONS_EACH: u32 = 4096;
 
 const SIZE: u32 = 256;
 const CENTER: Vec3 = Vec3::new(0.0, 0.8, 0.0);
@@ -36,7 +36,7 @@ pub(crate) fn section() -> Result<String, Failure> {
         | --: | --: | --: | --: |\n"
     );
     let camera = camera_over(Vec3::ZERO)?;
-    for radius in [0.01f32, 0.05, 0.1, 0.2, 0.4, 0.8] {
+    for radius in [0.01f32, 0.1, 0.3, 0.8] {
         let area = std::f32::consts::PI * radius * radius;
         let radiance = FLUX / (std::f32::consts::PI * area);
         let disc = Light::disc(LAMP, [0.0, -1.0, 0.0], radius, [radiance; 3])?;

@@ -2,10 +2,11 @@
 //! progressive pictures converge. Writes `docs/emission.md`.
 //!
 //! ```text
-//! cargo run --release -p caustics-benches --bin emission [file.md]
+//! cargo run --release -p caustics-benches --bin emission [section ...]
 //! ```
 //!
-//! It takes some minutes. Every number but the seconds is the same on any machine.
+//! Sections are `aim`, `frames`, `share`, `progressive` and `area`; those that are not named stay as
+//! they are. All take some minutes. Every number but the seconds is the same on any machine.
 
 mod aim;
 mod area;
@@ -14,8 +15,8 @@ mod frames;
 mod share;
 mod view;
 
-use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 use caustics_benches::stage::Failure;
 
@@ -26,26 +27,51 @@ Measured by `cargo run --release -p caustics-benches --bin emission`, which writ
 default estimate (`grid-gaussian`) unless said. relMSE is the mean of `(t - r)² / (r² + (0.1 mean
 r)²)` over all pixels and channels. Every number but the seconds is the same on any machine; the
 seconds are of two threads of a shared one, so compare them only within a table.
-
 ";
 
+type Section = fn() -> Result<String, Failure>;
+
+const SECTIONS: [(&str, Section); 5] = [
+    ("aim", aim::section),
+    ("frames", frames::section),
+    ("share", share::section),
+    ("progressive", converge::section),
+    ("area", area::section),
+];
+
 fn main() -> Result<(), Failure> {
-    let path = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/emission.md").to_owned());
-    let mut page = INTRODUCTION.to_owned();
-    for (name, section) in [
-        ("aim", aim::section as fn() -> Result<String, Failure>),
-        ("frames", frames::section),
-        ("share", share::section),
-        ("progressive", converge::section),
-        ("area lights", area::section),
-    ] {
-        eprintln!("{name}");
-        writeln!(page, "{}", section()?.trim_end())?;
-        writeln!(page)?;
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(unknown) = wanted
+        .iter()
+        .find(|it| SECTIONS.iter().all(|(name, _)| name != it))
+    {
+        return Err(format!("no section is called {unknown}").into());
     }
-    fs::write(&path, format!("{}\n", page.trim_end()))?;
-    eprintln!("wrote {path}");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/emission.md");
+    for (name, section) in SECTIONS {
+        if wanted.is_empty() || wanted.iter().any(|it| it == name) {
+            eprintln!("{name}");
+            replace(Path::new(path), name, section()?.trim_end())?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes one section into the page and leaves the others as they are: at once, so that little is
+/// lost when the program is stopped.
+fn replace(path: &Path, name: &str, text: &str) -> Result<(), Failure> {
+    let old = fs::read_to_string(path).unwrap_or_default();
+    let mark = |name: &str| format!("<!-- {name} -->\n");
+    let mut page = INTRODUCTION.to_owned();
+    for (section, _) in SECTIONS {
+        let kept = old
+            .split_once(&mark(section))
+            .map(|(_, rest)| rest.split("<!-- ").next().unwrap_or_default().trim());
+        let body = if section == name { Some(text) } else { kept };
+        if let Some(body) = body {
+            page.push_str(&format!("\n{}\n{body}\n", mark(section)));
+        }
+    }
+    fs::write(path, page)?;
     Ok(())
 }
