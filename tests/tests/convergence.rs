@@ -37,6 +37,7 @@ fn the_error_falls_behind_a_lens() -> Result<(), TestError> {
 }
 
 #[test]
+#[ignore = "the exact picture takes a minute of integrals over the wall; the program holds it, too"]
 fn the_error_falls_in_a_mirror_ring() -> Result<(), TestError> {
     falls(&ExactPicture::mirror_cylinder()?, &[10, 12, 14, 16, 18])
 }
