@@ -134,11 +134,11 @@ fn table(
 }
 
 fn chart(series: &[Series]) -> String {
-    const WIDTH: f64 = 640.0;
+    const WIDTH: f64 = 680.0;
     const HEIGHT: f64 = 440.0;
     const FRAME: [f64; 4] = [64.0, 20.0, 440.0, 390.0];
     /// Decades of the error.
-    const DECADES: [i32; 2] = [-6, 1];
+    const DECADES: [i32; 2] = [-7, 1];
     let [left, top, right, bottom] = FRAME;
     let x = |power: f64| {
         let part = (power - f64::from(COUNTS[0])) / f64::from(COUNTS[1] - COUNTS[0]);
