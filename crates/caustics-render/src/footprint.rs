@@ -42,8 +42,10 @@ pub struct FootprintOptions {
     pub max_anisotropy: f32,
     /// In how many footprints a point may lie that is looked up, on the mean; above 0. Where they
     /// would be more, one in several of the widest stands for all of them, with their flux: chains
-    /// of inner reflections spread a little light over everything, from thousands of photons.
-    /// Infinite keeps all. Splats draw all of them in any case.
+    /// of inner reflections spread a little light over everything, from thousands of photons. It
+    /// costs noise where such light is most of what there is. Infinite, the default, keeps all;
+    /// [`render`](crate::render()) keeps to 128 for what is seen through glass and in mirrors.
+    /// Splats draw all of them in any case.
     pub max_overlaps: f32,
 }
 
@@ -53,7 +55,7 @@ impl Default for FootprintOptions {
             kernel: FootprintKernel::Gaussian,
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
-            max_overlaps: 128.0,
+            max_overlaps: f32::INFINITY,
         }
     }
 }

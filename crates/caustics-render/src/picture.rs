@@ -18,6 +18,9 @@ use crate::splat::splat;
 /// The largest width and height of a picture.
 const MAX_SIZE: u32 = 32_768;
 
+/// In how many footprints a point seen through glass or in a mirror lies, on the mean, at most.
+const OVERLAPS: f32 = 128.0;
+
 /// Through what the camera may see a caustic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Visibility {
@@ -151,7 +154,13 @@ pub fn render<I: Intersect + ?Sized>(
             let (image, _) = splat(&buffer, photons, footprints)?;
             let gather = match options.visibility {
                 Visibility::Direct => None,
-                Visibility::Full => Some(FootprintGather::new(photons, footprints)?),
+                Visibility::Full => {
+                    let thinned = FootprintOptions {
+                        max_overlaps: footprints.max_overlaps.min(OVERLAPS),
+                        ..*footprints
+                    };
+                    Some(FootprintGather::new(photons, &thinned)?)
+                }
             };
             (Some(image), gather)
         }
