@@ -272,7 +272,14 @@ fn measure(gpu: &Gpu, name: &str, photons: u32) -> Result<(), Failure> {
     let mut expected = Vec::new();
     for _ in 0..ROUNDS {
         let start = Instant::now();
-        let (image, _) = splat(&buffer, &map.photons, &FootprintOptions::default())?;
+        let (image, _) = splat(
+            &buffer,
+            &map.photons,
+            &FootprintOptions {
+                integrate_pixels: false,
+                ..FootprintOptions::default()
+            },
+        )?;
         cpu_splat.push(1e3 * start.elapsed().as_secs_f64());
         expected = image.into_pixels();
         for way in &mut ways {

@@ -47,6 +47,10 @@ pub struct FootprintOptions {
     /// [`render`](crate::render()) keeps to 128 for what is seen through glass and in mirrors.
     /// Splats draw all of them in any case.
     pub max_overlaps: f32,
+    /// Whether a splat integrates footprints as small as pixels over each pixel, for the Gaussian
+    /// kernel on Lambertian receivers; if not, they are blurred by the pixel and read at its middle,
+    /// which lets a bright line leak some percent into the pixels beside it.
+    pub integrate_pixels: bool,
 }
 
 impl Default for FootprintOptions {
@@ -56,6 +60,7 @@ impl Default for FootprintOptions {
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
             max_overlaps: f32::INFINITY,
+            integrate_pixels: true,
         }
     }
 }

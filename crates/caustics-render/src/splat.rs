@@ -184,7 +184,7 @@ impl PixelIntegral {
         center: Vec2,
         options: &FootprintOptions,
     ) -> Option<Self> {
-        if options.kernel != FootprintKernel::Gaussian {
+        if options.kernel != FootprintKernel::Gaussian || !options.integrate_pixels {
             return None;
         }
         let (tangent, bitangent) = photon.normal.any_orthonormal_pair();

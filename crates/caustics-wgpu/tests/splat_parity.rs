@@ -27,7 +27,13 @@ fn assert_parity(
     for name in names {
         let stage = Stage::load(name, 20_000)?;
         let picture = stage.picture(&stage.camera, SIZE);
-        let expected = stage.splat(&picture, &FootprintOptions::default())?;
+        let expected = stage.splat(
+            &picture,
+            &FootprintOptions {
+                integrate_pixels: false,
+                ..FootprintOptions::default()
+            },
+        )?;
         let (found, stats) =
             irradiance(&device, &queue, &with(splat), &picture, &[&stage.photons])?;
         let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
@@ -84,6 +90,8 @@ fn every_kernel_draws_the_picture_of_the_cpu() -> Result<(), TestError> {
                 kernel: twin,
                 scale,
                 max_anisotropy,
+                integrate_pixels: false,
+                ..FootprintOptions::default()
             };
             let expected = stage.splat(&picture, &options)?;
             let options = with(SplatOptions {
