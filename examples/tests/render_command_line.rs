@@ -399,6 +399,7 @@ fn statistics_have_their_documented_keys_and_balance() -> TestResult {
         "energy",
         "normal_fallbacks",
         "bounded_differentials",
+        "replaced_differentials",
         "seconds",
         "photon_rays",
         "photon_rays_per_second",
