@@ -15,6 +15,7 @@ fn irradiance(light: Light, post: Vec3) -> f32 {
     lit(Lit::By(light), post)
 }
 
+#[derive(Clone, Copy)]
 enum Lit {
     By(Light),
     /// A sky of this radiance everywhere.
