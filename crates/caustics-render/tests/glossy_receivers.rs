@@ -70,7 +70,12 @@ impl Floor {
     /// The radiance of every pixel by splatting.
     fn splatted(&self) -> Vec<Vec3> {
         let buffer = GBuffer::new(&self.world, &self.rays, &self.camera, SIZE, SIZE).unwrap();
-        let (image, stats) = splat(&buffer, &self.photons, &FootprintOptions::default()).unwrap();
+        // Read where the gather and glossy texels are: at the pixels' middles.
+        let options = FootprintOptions {
+            integrate_pixels: false,
+            ..FootprintOptions::default()
+        };
+        let (image, stats) = splat(&buffer, &self.photons, &options).unwrap();
         assert!(stats.splatted > 0);
         image.pixels().iter().map(|&it| Vec3::from(it)).collect()
     }

@@ -42,6 +42,9 @@ pub enum Quantum {
 /// Photons of a pass are kept as long as they are no more than `max_photons`; of larger passes only
 /// the picture is, so that memory stays bounded however long it runs.
 ///
+/// Photons come in slices, so footprints are not checked against their neighbours
+/// ([`TraceOptions::check_footprints`]).
+///
 /// With [`Estimate::Nearest`] the number of nearest photons grows as the total to the power of 2/3,
 /// so that the radius shrinks while more photons are in it, as in stochastic progressive photon
 /// mapping; passes end at `max_photons` and their pictures are averaged from there on.
@@ -389,6 +392,8 @@ impl Pass {
         options: &CausticsOptions,
     ) -> Result<Self, CausticsError> {
         let options = TraceOptions {
+            // A slice of a pass does not know the neighbours of its last photons.
+            check_footprints: false,
             photons: FIRST_PASS,
             ..options.trace
         };

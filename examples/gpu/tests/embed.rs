@@ -19,10 +19,13 @@ struct Expected {
 impl Expected {
     fn new(scene: &Scene, trace: TraceOptions) -> Result<Self, Failure> {
         let [width, height] = SIZE;
-        let options = CausticsOptions {
+        let mut options = CausticsOptions {
             trace,
             ..CausticsOptions::default()
         };
+        // As on the GPU.
+        options.trace.check_footprints = false;
+        options.footprint.integrate_pixels = false;
         let size = PictureOptions {
             width,
             height,
