@@ -21,9 +21,12 @@ const ARROWS: [(&str, &[&str]); 9] = [
         "caustics-render",
         &["trace", "filter", "sampling", "scene", "accel", "geometry"],
     ),
+    // Its tests compare it with its twins in `render`.
     (
         "caustics-wgpu",
-        &["trace", "filter", "sampling", "scene", "accel", "geometry"],
+        &[
+            "render", "trace", "filter", "sampling", "scene", "accel", "geometry",
+        ],
     ),
     (
         "caustics",
@@ -34,7 +37,12 @@ const ARROWS: [(&str, &[&str]); 9] = [
 ];
 
 /// Packages that nobody depends on, and that may depend on everything.
-const TOPS: [&str; 3] = ["caustics-examples", "caustics-tests", "caustics-benches"];
+const TOPS: [&str; 4] = [
+    "caustics-examples",
+    "caustics-gpu-examples",
+    "caustics-tests",
+    "caustics-benches",
+];
 
 type Arrows = BTreeMap<String, Vec<String>>;
 

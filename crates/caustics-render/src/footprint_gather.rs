@@ -67,7 +67,7 @@ pub struct GatherStats {
 ///
 /// ```
 /// use caustics_render::{FootprintGather, FootprintOptions};
-/// use caustics_trace::Photon;
+/// use caustics_trace::{FootprintSource, Photon};
 /// use glam::Vec3;
 ///
 /// // One watt, straight down, over about a square decimetre of the floor.
@@ -79,6 +79,7 @@ pub struct GatherStats {
 ///     axes: [0.1 * Vec3::X, 0.1 * Vec3::Z],
 ///     object: 0,
 ///     events: 1,
+///     source: FootprintSource::Checked,
 /// };
 /// let gather = FootprintGather::new(&[photon], &FootprintOptions::default())?;
 /// assert!(gather.irradiance(Vec3::ZERO, Vec3::Y).x > 50.0);

@@ -27,7 +27,7 @@ const LAST_EXPONENT: i32 = 31;
 /// not kept.
 ///
 /// ```
-/// use caustics_trace::{CompactPhoton, Photon, glam::Vec3};
+/// use caustics_trace::{CompactPhoton, FootprintSource, Photon, glam::Vec3};
 ///
 /// let photon = Photon {
 ///     position: Vec3::new(1.0, 2.0, 3.0),
@@ -37,6 +37,7 @@ const LAST_EXPONENT: i32 = 31;
 ///     axes: [Vec3::X, Vec3::Z],
 ///     object: 0,
 ///     events: 2,
+///     source: FootprintSource::Checked,
 /// };
 /// let compact = CompactPhoton::from(&photon);
 /// assert_eq!(size_of_val(&compact), 20);

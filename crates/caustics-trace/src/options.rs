@@ -61,7 +61,7 @@ pub struct TraceOptions {
     /// Where the lattice is made finer.
     pub refinement: Refinement,
     /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
-    /// those are nearer, and drawn in at the edges of sheets of light.
+    /// those are nearer, and drawn in at the edges of sheets of light. Not where photons are culled.
     pub check_footprints: bool,
     /// Whether photons carry differentials. Without, their footprints have no axes: enough for
     /// estimates from the nearest photons, at less time.

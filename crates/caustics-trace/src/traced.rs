@@ -1,5 +1,6 @@
 use caustics_sampling::Sequence;
 
+use crate::culling::Culling;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{CheckedFootprint, LatticePhotons};
 use crate::options::TraceOptions;
@@ -45,7 +46,9 @@ impl Traced {
         let is_lattice = planned.points().sequence() == Sequence::Grid
             && planned.emitter().dimensions() == 2
             && self.starts.len() == planned.count() as usize;
-        if !(options.check_footprints && options.differentials && is_lattice) {
+        // Where photons were culled, those beside them would seem to stand at an edge.
+        let is_whole = options.culling == Culling::default();
+        if !(options.check_footprints && options.differentials && is_lattice && is_whole) {
             return;
         }
         let lattice = planned.lattice();

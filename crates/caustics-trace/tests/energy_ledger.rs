@@ -193,6 +193,7 @@ fn photons_without_differentials_land_where_those_with_do() {
             let options = TraceOptions {
                 photons: 1000,
                 differentials,
+                check_footprints: false,
                 ..TraceOptions::default()
             };
             trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options")

@@ -54,7 +54,7 @@ pub enum Quantum {
 /// use caustics::prelude::*;
 /// use caustics::scene::builtin;
 ///
-/// let scene = builtin::cognac_glass()?;
+/// let scene = builtin::cognac_glass();
 /// let size = PictureOptions { width: 32, height: 24, samples: 1, ..PictureOptions::default() };
 /// let mut progressive = Progressive::new(&scene, &CausticsOptions::default(), 100_000)?;
 /// progressive.look(&scene.cameras()[0], &size)?;
