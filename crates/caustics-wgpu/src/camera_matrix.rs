@@ -15,7 +15,7 @@ use glam::camera::rh::proj::directx;
 /// let matrix = Mat4::from_cols_array_2d(&camera_matrix(&camera, [640, 480], 1.0, 10.0));
 /// let middle = matrix.project_point3(Vec3::ZERO);
 /// assert!(middle.truncate().length() < 1e-6 && middle.z > 0.0 && middle.z < 1.0);
-/// # Ok::<(), caustics_scene::SceneError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[must_use]
 pub fn camera_matrix(camera: &Camera, size: [u32; 2], near: f32, far: f32) -> [[f32; 4]; 4] {

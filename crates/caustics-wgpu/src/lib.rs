@@ -4,7 +4,7 @@
 //! render passes into the host's encoder, and submits, polls and presents nothing.
 //!
 //! ```
-//! use caustics_trace::Photon;
+//! use caustics_trace::{FootprintSource, Photon};
 //! use caustics_wgpu::FootprintRecord;
 //! use caustics_wgpu::glam::Vec3;
 //!
@@ -17,6 +17,7 @@
 //!     axes: [0.1 * Vec3::X, 0.2 * Vec3::Z],
 //!     object: 7,
 //!     events: 2,
+//!     source: FootprintSource::Differential,
 //! };
 //! let record = FootprintRecord::from(&photon);
 //! assert_eq!(record.flux(), photon.flux);

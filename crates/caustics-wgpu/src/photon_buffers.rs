@@ -65,7 +65,7 @@ impl PhotonBuffers {
 
     /// Links between records: a word for each photon of the batch, the place after its last record
     /// or 0 for none; then two words for each record, the place after the record that its photon
-    /// stored before, and a hash of the path that led to it (the same as
+    /// stored before, and a hash of what the path met before it landed (the same as
     /// [`PhotonTrail::paths`](caustics_trace::PhotonTrail::paths)).
     #[must_use]
     pub fn links(&self) -> &wgpu::Buffer {

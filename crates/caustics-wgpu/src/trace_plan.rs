@@ -7,7 +7,8 @@ use caustics_sampling::warp::Cone;
 use caustics_sampling::{CounterRng, Grid, Rank1Lattice, Rotation, Sequence};
 use caustics_scene::{Light, World};
 use caustics_trace::{
-    AreaSurface, Branching, EmissionBatch, EmissionDomain, EmissionPlan, MediumStack, TraceOptions,
+    AreaSurface, Branching, Culling, EmissionBatch, EmissionDomain, EmissionPlan, MediumStack,
+    TraceOptions,
 };
 use glam::{DVec3, Vec2, Vec3};
 
@@ -50,7 +51,8 @@ impl TracePlan {
     ///
     /// # Errors
     /// [`GpuError::Options`] for options out of range, [`GpuError::Unsupported`] for
-    /// [`Refinement`](caustics_trace::Refinement), and [`GpuError::TooMany`].
+    /// [`Refinement`](caustics_trace::Refinement), [`Culling`] and light from an
+    /// [`Environment`](caustics_scene::Environment), and [`GpuError::TooMany`].
     pub fn new<I: Intersect + ?Sized>(
         world: &World,
         intersect: &I,
@@ -71,8 +73,7 @@ impl TracePlan {
         options: &TraceOptions,
     ) -> Result<Self, GpuError> {
         options.validate()?;
-        if options.refinement.levels > 0 {
-            let what = "photons whose lattice is refined";
+        if let Some(what) = unsupported(options) {
             return Err(GpuError::Unsupported { what });
         }
         let photons = emission.batches().iter().map(|it| u64::from(it.count()));
@@ -187,6 +188,22 @@ impl TracePlan {
     }
 }
 
+/// What the options ask for that the shaders do not do.
+fn unsupported(options: &TraceOptions) -> Option<&'static str> {
+    let none = Culling::default();
+    if options.refinement.levels > 0 {
+        Some("photons whose lattice is refined")
+    } else if options.culling.min_flux != none.min_flux {
+        Some("photons that are culled by their flux (`Culling::min_flux`)")
+    } else if options.culling.max_area != none.max_area {
+        Some("photons that are culled by their footprint's area (`Culling::max_area`)")
+    } else if options.culling.view != none.view {
+        Some("photons that are culled by a view (`Culling::view`)")
+    } else {
+        None
+    }
+}
+
 /// What the shader is told of an emitter's rays; `None` where it has none.
 fn mirror(
     world: &World,
@@ -245,6 +262,11 @@ fn mirror(
             }
         }
         EmissionDomain::Nothing => return Ok(None),
+        EmissionDomain::Sky { .. } => {
+            return Err(GpuError::Unsupported {
+                what: "light from an environment",
+            });
+        }
         _ => {
             return Err(GpuError::Unsupported {
                 what: "a kind of light",

@@ -7,8 +7,8 @@
 mod common;
 
 use caustics_geometry::shapes::{heightfield, icosphere};
-use caustics_scene::{Instance, Light, Material, Scene, Shape, World};
-use caustics_trace::{Refinement, TraceOptions};
+use caustics_scene::{Camera, Environment, Instance, Light, Material, Scene, Shape, World};
+use caustics_trace::{Culling, Refinement, TraceOptions, ViewVolume};
 use caustics_wgpu::glam::{Affine3A, Vec3};
 use caustics_wgpu::{
     GpuError, PhotonBuffers, RendererError, SceneBuffers, SceneRefit, TraceCounters, TracePlan,
@@ -259,6 +259,54 @@ fn what_the_shaders_cannot_do_is_an_error() {
         ..options()
     };
     assert!(matches!(plan(&refined), Err(GpuError::Unsupported { .. })));
+    let camera = Camera::look_at("", [0.0, 1.0, 5.0], [0.0; 3], [0.0, 1.0, 0.0], 0.8).unwrap();
+    let none = Culling::default();
+    for (named, culling) in [
+        (
+            "min_flux",
+            Culling {
+                min_flux: 1e-6,
+                ..none
+            },
+        ),
+        (
+            "max_area",
+            Culling {
+                max_area: 1.0,
+                ..none
+            },
+        ),
+        (
+            "view",
+            Culling {
+                view: ViewVolume::of(&camera, 64, 48),
+                ..none
+            },
+        ),
+    ] {
+        assert_ne!(culling, none);
+        let culled = TraceOptions {
+            culling,
+            ..options()
+        };
+        let error = plan(&culled).unwrap_err();
+        assert!(
+            matches!(error, GpuError::Unsupported { what } if what.contains(named)),
+            "{named}: {error}"
+        );
+    }
+    let mut open = glass();
+    open.set_environment(Some(
+        Environment::new(4, 2, vec![[1.0, 0.9, 0.8]; 8]).unwrap(),
+    ));
+    for stage in [
+        Stage::new(World::new(&open).unwrap()),
+        lit(open.clone(), lamp()),
+    ] {
+        let error = TracePlan::new(&stage.world, &stage.rays, &options()).unwrap_err();
+        let what = "light from an environment";
+        assert_eq!(error, GpuError::Unsupported { what });
+    }
     let heavy = TraceOptions {
         min_weight: 2.0,
         ..options()

@@ -36,8 +36,8 @@ fn the_same_photons_land_in_the_same_places() {
             difference.flux,
             difference.axes,
         );
-        for (cause, photons) in &difference.paths {
-            println!("  {cause}: {photons:?}");
+        for (cause, (count, first)) in difference.first_of_paths() {
+            println!("  {cause}: {count}, the first {first:?}");
         }
         let ledger = ledger_of(&trails, &plan);
         let of_scene = difference

@@ -58,7 +58,7 @@ fn receive(branch: Branch, point: SurfacePoint) {
         side * point.geometric_normal,
         photon_number,
     );
-    let has_room = store_photon(record, extended(branch.path, object, 0u));
+    let has_room = store_photon(record, branch.path);
     book(select(FATE_CROWDED, FATE_STORED, has_room), branch.flux);
 }
 
