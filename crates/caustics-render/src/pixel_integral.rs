@@ -201,7 +201,11 @@ mod tests {
     #[test]
     fn a_line_beside_a_pixels_edge_leaks_nothing() {
         // Upright, 0.05 from the edge, 0.01 wide.
-        let found = weights(Vec2::new(4.05, 4.0), &turned(0.7, 0.01, 1.570_796_3), 8);
+        let found = weights(
+            Vec2::new(4.05, 4.0),
+            &turned(0.7, 0.01, std::f32::consts::FRAC_PI_2),
+            8,
+        );
         for row in 0..8 {
             assert_abs_diff_eq!(found[row * 8 + 3], 0.0, epsilon = 1e-6);
         }

@@ -193,13 +193,11 @@ impl PixelIntegral {
         let covariance =
             Covariance::of_axes(&photon.axes, photon.normal, options).mapped(&to_pixels);
         let (short, _) = covariance.eigenvalues();
-        if !(short < INTEGRATED_SIGMA * INTEGRATED_SIGMA) {
-            return None;
-        }
         let gaussian = PixelGaussian::new(center, &covariance);
         let strength = photon.flux * (to_pixels.determinant().abs() / incident_cosine(photon));
-        (gaussian.extent().max_element() < INTEGRATED_EXTENT && strength.is_finite())
-            .then_some(Self { gaussian, strength })
+        let is_small = short < INTEGRATED_SIGMA * INTEGRATED_SIGMA
+            && gaussian.extent().max_element() < INTEGRATED_EXTENT;
+        (is_small && strength.is_finite()).then_some(Self { gaussian, strength })
     }
 }
 

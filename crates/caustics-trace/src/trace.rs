@@ -133,8 +133,8 @@ pub fn trace_part<I: Intersect + ?Sized>(
 pub struct PhotonTrail {
     /// Its parts that were stored, in the order in which they landed.
     pub photons: Vec<Photon>,
-    /// For each of them, a hash of the objects that it met and of what it did there. Photons of one
-    /// path are parts of one smooth sheet of light.
+    /// For each of them, a hash of the objects that it met before it landed and of what it did there.
+    /// Photons of one path on one object are parts of one smooth sheet of light.
     pub paths: Vec<u32>,
     /// Where its energy went.
     pub ledger: EnergyLedger,
