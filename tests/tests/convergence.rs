@@ -28,7 +28,7 @@ fn falls(picture: &ExactPicture, powers: &[u32]) -> Result<(), TestError> {
 
 #[test]
 fn the_error_falls_behind_a_ball() -> Result<(), TestError> {
-    falls(&ExactPicture::sphere_lens()?, &[10, 12, 14, 16])
+    falls(&ExactPicture::sphere_lens()?, &[10, 12, 14, 16, 18])
 }
 
 #[test]
@@ -44,12 +44,12 @@ fn the_error_falls_in_a_mirror_ring() -> Result<(), TestError> {
 
 #[test]
 fn the_error_falls_before_a_parabolic_mirror() -> Result<(), TestError> {
-    falls(&ExactPicture::parabolic_mirror()?, &[10, 12, 14])
+    falls(&ExactPicture::parabolic_mirror()?, &[10, 12, 14, 16, 18])
 }
 
 #[test]
 fn the_error_falls_under_water() -> Result<(), TestError> {
-    falls(&ExactPicture::wavy_water()?, &[10, 12, 14])
+    falls(&ExactPicture::wavy_water()?, &[10, 12, 14, 16, 18])
 }
 
 #[test]
@@ -67,9 +67,8 @@ fn control_fewer_photons_are_farther_off() -> Result<(), TestError> {
 }
 
 #[test]
-#[ignore = "takes minutes, and does not hold: the ball, the ring and the folded water are left with \
-            the pixel's blur at folds; the parabolic mirror and the wavy water rise where the lattice \
-            is about as wide as a pixel; see docs/convergence.md"]
+#[ignore = "takes minutes, and does not hold under water at 2^22, where the error rises by 9 % of \
+            1.5e-7 on the wavy and by 1 % of 3.4e-5 on the folded one; see docs/convergence.md"]
 fn the_error_falls_up_to_four_million_photons() -> Result<(), TestError> {
     let powers: Vec<u32> = (10..=22).step_by(2).collect();
     for picture in ExactPicture::all()? {
@@ -79,8 +78,8 @@ fn the_error_falls_up_to_four_million_photons() -> Result<(), TestError> {
 }
 
 #[test]
-#[ignore = "does not hold but for the parabolic mirror: at folds and edges a pixel's middle, blurred, \
-            is not the pixel's mean, at any count, while the median falls; see docs/convergence.md"]
+#[ignore = "takes minutes, and does not hold but for the parabolic mirror: the pixels at folds and \
+            edges are farther off than the median by more; see docs/convergence.md"]
 fn no_pixel_is_ten_times_as_far_off_as_the_median() -> Result<(), TestError> {
     for picture in ExactPicture::all()? {
         for error in errors(&picture, &[14, 16, 18, 20, 22])? {
