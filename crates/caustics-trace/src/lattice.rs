@@ -201,3 +201,83 @@ fn partition_point(count: u32, is_before: impl Fn(u32) -> bool) -> u32 {
     }
     low
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a used point lies.
+    fn place(lattice: &Lattice, index: u32) -> glam::Vec2 {
+        lattice.points().point(lattice.number(index))
+    }
+
+    #[test]
+    fn neighbours_lie_beside_each_other() {
+        // Rows of unequal length, too.
+        for count in [1, 2, 7, 64, 90, 1000] {
+            let lattice = Lattice::whole(Sequence::Grid, count, 0);
+            let rows = Grid::new(count).rows() as f32;
+            let longest = Grid::new(count).columns(0) as f32;
+            let (mut along, mut across) = (0, 0);
+            for index in 0..count {
+                let own = place(&lattice, index);
+                let [horizontal, vertical] = lattice.neighbours(index);
+                for (found, sign) in horizontal.into_iter().zip([-1.0, 1.0]) {
+                    let Some(found) = found else { continue };
+                    along += 1;
+                    let step = place(&lattice, found) - own;
+                    assert!(sign * step.x > 0.5 / longest && step.y == 0.0, "{step}");
+                    assert!(step.x.abs() < 1.6 / longest, "{step}");
+                }
+                for (found, sign) in vertical.into_iter().zip([-1.0, 1.0]) {
+                    let Some(found) = found else { continue };
+                    across += 1;
+                    let step = place(&lattice, found) - own;
+                    assert!(
+                        sign * step.y > 0.5 / rows && step.y.abs() < 1.6 / rows,
+                        "{step}"
+                    );
+                    assert!(step.x.abs() < 1.1 / longest, "{step}");
+                }
+            }
+            // Each pair twice, but for the ends of rows and columns.
+            let grid = Grid::new(count);
+            assert_eq!(along, 2 * (count - grid.rows()));
+            assert_eq!(
+                across,
+                2 * count - grid.columns(0) - grid.columns(grid.rows() - 1)
+            );
+        }
+    }
+
+    #[test]
+    fn points_that_are_not_used_are_no_neighbours() {
+        let points = PointSet::new(Sequence::Grid, 100, 0);
+        // The third to fifth column of the first two rows, and the fourth of the third.
+        let lattice = Lattice {
+            points,
+            spans: Some(vec![
+                Span {
+                    first: 2,
+                    before: 0,
+                },
+                Span {
+                    first: 12,
+                    before: 3,
+                },
+                Span {
+                    first: 23,
+                    before: 6,
+                },
+            ]),
+            count: 7,
+        };
+        assert_eq!(lattice.neighbours(0), [[None, Some(1)], [None, Some(3)]]);
+        assert_eq!(
+            lattice.neighbours(4),
+            [[Some(3), Some(5)], [Some(1), Some(6)]]
+        );
+        assert_eq!(lattice.neighbours(5), [[Some(4), None], [Some(2), None]]);
+        assert_eq!(lattice.neighbours(6), [[None, None], [Some(4), None]]);
+    }
+}
