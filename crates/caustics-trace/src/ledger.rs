@@ -119,6 +119,11 @@ pub struct EnergyLedger {
     pub bounded_differentials: u64,
     /// Footprints that were taken from a neighbour's landing because their differential was longer.
     pub replaced_differentials: u64,
+    /// What the photons at silhouettes carry more than their paths brought them, or less where it is
+    /// negative, in watts: each stands for the light from the silhouette on, of which its row of the
+    /// lattice may have more or less than a cell. [`Fate::Stored`] is without it, and on the mean it
+    /// is little.
+    pub silhouette_gain: DVec3,
     /// Rays traced, shadow rays not among them.
     pub rays: u64,
 }
@@ -218,6 +223,7 @@ impl EnergyLedger {
         self.replaced_differentials = self
             .replaced_differentials
             .saturating_sub(other.replaced_differentials);
+        self.silhouette_gain -= other.silhouette_gain;
         self.bounded_differentials = self
             .bounded_differentials
             .saturating_sub(other.bounded_differentials);
@@ -245,6 +251,7 @@ impl EnergyLedger {
         self.normal_fallbacks += other.normal_fallbacks;
         self.bounded_differentials += other.bounded_differentials;
         self.replaced_differentials += other.replaced_differentials;
+        self.silhouette_gain += other.silhouette_gain;
         self.rays += other.rays;
     }
 }

@@ -136,6 +136,7 @@ mod plan;
 mod projection_map;
 mod refine;
 mod scatter;
+mod silhouette;
 mod sky_emission;
 mod trace;
 mod traced;

@@ -2,6 +2,7 @@ use glam::Vec3;
 
 use crate::lattice::Lattice;
 use crate::photon::{FootprintSource, Photon};
+use crate::silhouette::Silhouette;
 
 /// How many times as far as its neighbours landed a photon's axis may reach.
 ///
@@ -21,13 +22,6 @@ const LIMIT: f32 = 1.5;
 /// the error of none at all where the light of a mirror ring or of a cube's face ends in the dark.
 const EDGE_SHIFT: f32 = 0.13;
 const EDGE_EXTENT: f32 = 0.69;
-
-/// By what a footprint is shortened that has been fitted to the end of the light already.
-const SILHOUETTE_EXTENT: f32 = 0.78;
-
-/// The least ratio of a differential to the distance of the one neighbour that tells a silhouette
-/// from an edge of even light.
-const LEAST_SILHOUETTE: f32 = 1.02;
 
 /// The largest ratio of a differential to the distance of a neighbour that is told from a larger
 /// one.
@@ -74,30 +68,41 @@ impl LatticePhotons<'_> {
 pub(crate) struct CheckedFootprint {
     pub(crate) position: Vec3,
     pub(crate) axes: [Vec3; 2],
+    /// How many cells of the lattice its flux is that of: other than one at a silhouette, which
+    /// leaves the last cell a part of its light, or adds what falls into the next.
+    pub(crate) cells: f32,
     pub(crate) source: FootprintSource,
 }
 
-/// A photon's footprint, no longer along each axis than its neighbours are far away, and drawn in
-/// where it has one on one side only; `landed` are the neighbours before and after it along each
-/// axis, where they have its path.
-pub(crate) fn checked(photon: &Photon, landed: &[[Option<&Photon>; 2]; 2]) -> CheckedFootprint {
-    let mut footprint = CheckedFootprint {
-        position: photon.position,
-        axes: photon.axes,
-        source: photon.source,
-    };
-    for (axis, pair) in footprint.axes.iter_mut().zip(landed) {
+/// What the neighbours along an axis say.
+struct Landed {
+    /// To the farthest of them, in the plane of the footprint.
+    farthest: Vec3,
+    /// How many times as long as that the axis is.
+    ratio: f32,
+    /// Where the light ends on one side of the photon.
+    edge: Option<Edge>,
+}
+
+enum Edge {
+    Even,
+    Silhouette(Silhouette),
+}
+
+impl Landed {
+    /// Of the neighbours before and after a photon along one axis; `None` without one on the same
+    /// object: past a corner light goes on, on a receiver whose plane says nothing about this one.
+    fn of(photon: &Photon, axis: Vec3, pair: &[Option<&Photon>; 2]) -> Option<Self> {
         let in_plane = |neighbour: &Photon| {
             let displacement = neighbour.position - photon.position;
             displacement - photon.normal * displacement.dot(photon.normal)
         };
-        // Past a corner light goes on, on a receiver whose plane says nothing about this one.
-        let distances = pair.map(|it| it.filter(|it| it.object == photon.object).map(in_plane));
-        let farthest = distances
-            .into_iter()
+        let farthest = pair
+            .iter()
             .flatten()
-            .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-        let Some(farthest) = farthest else { continue };
+            .filter(|it| it.object == photon.object)
+            .map(|it| in_plane(it))
+            .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
         let distance = farthest.length();
         // By its largest coordinate where the square of a long axis overflows.
         let largest = axis.abs().max_element();
@@ -108,14 +113,61 @@ pub(crate) fn checked(photon: &Photon, landed: &[[Option<&Photon>; 2]; 2]) -> Ch
         };
         let ratio = (length / distance).min(MAX_RATIO);
         let is_edge = pair.iter().flatten().count() == 1;
-        let (inwards, extent) = match is_edge {
-            true if ratio > LEAST_SILHOUETTE => silhouette(ratio),
-            true => (EDGE_SHIFT, EDGE_EXTENT),
-            false => (0.0, 1.0),
+        let edge = is_edge.then(|| Silhouette::of(ratio).map_or(Edge::Even, Edge::Silhouette));
+        Some(Self {
+            farthest,
+            ratio,
+            edge,
+        })
+    }
+
+    /// How far from the photon a silhouette is, in cells.
+    fn inside(&self) -> f32 {
+        match &self.edge {
+            Some(Edge::Silhouette(silhouette)) => silhouette.inside,
+            _ => f32::INFINITY,
+        }
+    }
+}
+
+/// A photon's footprint, no longer along each axis than its neighbours are far away, and drawn in
+/// where it has one on one side only; `landed` are the neighbours before and after it along each
+/// axis, where they have its path.
+///
+/// A silhouette ends the rows of the lattice that it crosses more steeply than the columns: the last
+/// photon of each has all of its row's light from the silhouette on. So a silhouette is told by the
+/// axis on which it is nearer, and within a cell.
+pub(crate) fn checked(photon: &Photon, neighbours: &[[Option<&Photon>; 2]; 2]) -> CheckedFootprint {
+    let mut footprint = CheckedFootprint {
+        position: photon.position,
+        axes: photon.axes,
+        cells: 1.0,
+        source: photon.source,
+    };
+    let landed = [0, 1].map(|i| Landed::of(photon, photon.axes[i], &neighbours[i]));
+    let inside = landed
+        .each_ref()
+        .map(|it| it.as_ref().map_or(f32::INFINITY, Landed::inside));
+    let steepest = usize::from(inside[1] < inside[0]);
+    let is_last = inside[steepest] < 1.0;
+    for (i, landed) in landed.iter().enumerate() {
+        let Some(landed) = landed else { continue };
+        let mut is_fitted = false;
+        let (inwards, extent) = match &landed.edge {
+            Some(Edge::Silhouette(_)) if is_last && i != steepest => (0.0, 1.0),
+            Some(Edge::Silhouette(silhouette)) => {
+                is_fitted = true;
+                let share = silhouette.share(is_last);
+                footprint.cells *= share.cells;
+                (share.inwards, share.extent)
+            }
+            Some(Edge::Even) => (EDGE_SHIFT, EDGE_EXTENT),
+            None => (0.0, 1.0),
         };
-        let unit = if ratio > LIMIT || (is_edge && ratio > LEAST_SILHOUETTE) {
+        let axis = &mut footprint.axes[i];
+        let unit = if landed.ratio > LIMIT || is_fitted {
             footprint.source = FootprintSource::Neighbour;
-            farthest
+            landed.farthest
         } else {
             if footprint.source == FootprintSource::Differential {
                 footprint.source = FootprintSource::Checked;
@@ -123,32 +175,10 @@ pub(crate) fn checked(photon: &Photon, landed: &[[Option<&Photon>; 2]; 2]) -> Ch
             *axis
         };
         // The axis may point either way.
-        footprint.position += inwards * farthest.dot(unit).signum() * unit;
+        footprint.position += inwards * landed.farthest.dot(unit).signum() * unit;
         *axis = extent * unit;
     }
     footprint
-}
-
-/// Where the light of a cell at a silhouette is, for a photon whose differential is `ratio` times,
-/// above 1, as long as the distance to its one neighbour: how far from it towards the neighbour, and
-/// how wide, in that distance.
-///
-/// A ray that meets a smooth surface a small distance x inside its silhouette turns, and lands away
-/// from the ray that just misses it, as c sqrt(x). With the cells' width as the unit, x is found
-/// from the ratio r of the photon's differential, c / (2 sqrt(x)), to the distance of its neighbour,
-/// c (sqrt(x + 1) - sqrt(x)): it is 1 / (4 r (r - 1)). The cell reaches from x - 1/2, or from the
-/// silhouette, to x + 1/2, and the mean and the variance of where its light lands follow.
-fn silhouette(ratio: f32) -> (f32, f32) {
-    let x = 1.0 / (4.0 * ratio * (ratio - 1.0));
-    let (low, high) = ((x - 0.5).max(0.0), x + 0.5);
-    // In c.
-    let mean = 2.0 / 3.0 * (high.powf(1.5) - low.powf(1.5)) / (high - low);
-    let variance = (0.5 * (low + high) - mean * mean).max(0.0);
-    // c in the distance to the neighbour.
-    let scale = 2.0 * ratio * x.sqrt();
-    // As wide as the even light that has this variance.
-    let width = (12.0 * variance).sqrt();
-    (scale * (mean - x.sqrt()), SILHOUETTE_EXTENT * scale * width)
 }
 
 #[cfg(test)]
@@ -215,7 +245,8 @@ mod tests {
         for x in [0.003f32, 0.1, 0.4, 0.9, 3.0] {
             let at = |x: f32| photon(x.sqrt() * Vec3::X, [Vec3::X / (2.0 * x.sqrt()), Vec3::Z]);
             let found = checked(&at(x), &[[None, Some(&at(x + 1.0))], [None; 2]]);
-            let low = f64::from(x - 0.5).max(0.0);
+            // The last photon has all light from the silhouette on.
+            let low = if x < 1.0 { 0.0 } else { f64::from(x - 0.5) };
             let high = f64::from(x) + 0.5;
             const STEPS: u32 = 100_000;
             let landings = (0..STEPS).map(|step| {
@@ -227,14 +258,34 @@ mod tests {
                 (f64::from(found.position.x) - mean).abs() < 2e-3 * mean,
                 "{x}"
             );
-            let expected = f64::from(SILHOUETTE_EXTENT) * (12.0 * variance).sqrt();
+            let expected = 0.78 * (12.0 * variance).sqrt();
             let width = f64::from(found.axes[0].length());
             assert!(
                 (width - expected).abs() < 0.02 * expected,
                 "{x}: {width} for {expected}"
             );
+            assert!((f64::from(found.cells) - (high - low)).abs() < 2e-3, "{x}");
             assert_eq!(found.source, FootprintSource::Neighbour);
         }
+    }
+
+    #[test]
+    fn a_slanted_silhouette_is_told_by_the_axis_that_crosses_it_steeply() {
+        // Light that lands at the root of the distance to a line that the columns cross at 3 cells
+        // where the rows cross it at one.
+        let at = |x: f32, y: f32| {
+            let root = (x + y / 3.0).sqrt();
+            let along_x = Vec3::X / (2.0 * root);
+            photon(
+                root * Vec3::X + y * Vec3::Z,
+                [along_x, along_x / 3.0 + Vec3::Z],
+            )
+        };
+        let last = at(0.2, 0.0);
+        let (right, above) = (at(1.2, 0.0), at(0.2, 1.0));
+        let found = checked(&last, &[[None, Some(&right)], [None, Some(&above)]]);
+        assert!((found.cells - 0.7).abs() < 1e-3, "{}", found.cells);
+        assert!(found.position.z.abs() < 1e-6);
     }
 
     #[test]

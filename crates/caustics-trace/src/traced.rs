@@ -76,6 +76,11 @@ impl Traced {
         for (photon, footprint) in self.photons.iter_mut().zip(checked) {
             photon.position = footprint.position;
             photon.axes = footprint.axes;
+            if footprint.cells != 1.0 {
+                let weighted = footprint.cells * photon.flux;
+                self.ledger.silhouette_gain += (weighted - photon.flux).as_dvec3();
+                photon.flux = weighted;
+            }
             photon.source = footprint.source;
             self.ledger.replaced_differentials +=
                 u64::from(footprint.source == FootprintSource::Neighbour);

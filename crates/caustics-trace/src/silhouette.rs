@@ -1,0 +1,67 @@
+/// By what a footprint is shortened that has been fitted to the end of the light already.
+const EXTENT: f32 = 0.78;
+
+/// The least ratio of a differential to the distance of the one neighbour that tells a silhouette
+/// from an edge of even light.
+const LEAST_RATIO: f32 = 1.02;
+
+/// A silhouette beside a photon of a lattice.
+///
+/// A ray that meets a smooth surface a small distance x inside its silhouette turns, and lands away
+/// from the ray that just misses it, as c sqrt(x). With the cells' width as the unit, x is found
+/// from the ratio r of the photon's differential, c / (2 sqrt(x)), to the distance of its neighbour,
+/// c (sqrt(x + 1) - sqrt(x)): it is 1 / (4 r (r - 1)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Silhouette {
+    ratio: f32,
+    /// How far inside the silhouette the photon is, in cells of the lattice.
+    pub(crate) inside: f32,
+}
+
+/// The part of the light at a silhouette that a photon stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Share {
+    /// In the light of whole cells.
+    pub(crate) cells: f32,
+    /// How far from the photon towards its neighbour the light's middle is, in their distance.
+    pub(crate) inwards: f32,
+    /// How wide the light is, in that distance.
+    pub(crate) extent: f32,
+}
+
+impl Silhouette {
+    /// Of a photon whose differential is `ratio` times as long as its one neighbour is far away;
+    /// `None` where that tells no silhouette.
+    pub(crate) fn of(ratio: f32) -> Option<Self> {
+        (ratio > LEAST_RATIO).then(|| Self {
+            ratio,
+            inside: 1.0 / (4.0 * ratio * (ratio - 1.0)),
+        })
+    }
+
+    /// The light between x - 1/2, or the silhouette where that is nearer or the photon is the `last`
+    /// of its row, and x + 1/2.
+    ///
+    /// With s and d for the sum and the difference of the roots of its ends, the mean of where it
+    /// lands is s / 2 + d² / (6 s) and the variance d² / 12 (1 - d² / (3 s²)), in which nothing
+    /// cancels.
+    pub(crate) fn share(&self, last: bool) -> Share {
+        let x = self.inside;
+        let low = if last { 0.0 } else { (x - 0.5).max(0.0) };
+        let high = x + 0.5;
+        // In c.
+        let sum = low.sqrt() + high.sqrt();
+        let difference = (high - low) / sum;
+        let mean = 0.5 * sum + difference * difference / (6.0 * sum);
+        let skew = difference / sum;
+        // As wide as the even light that has this variance.
+        let width = difference * (1.0 - skew * skew / 3.0).sqrt();
+        // c in the distance to the neighbour.
+        let scale = 2.0 * self.ratio * x.sqrt();
+        Share {
+            cells: if last { high } else { 1.0 },
+            inwards: scale * (mean - x.sqrt()),
+            extent: EXTENT * scale * width,
+        }
+    }
+}
