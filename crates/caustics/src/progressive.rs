@@ -6,7 +6,7 @@ use caustics_render::{
     Visibility, render, splat,
 };
 use caustics_scene::{Camera, Scene, SceneIntersector, World};
-use caustics_trace::{EmissionPlan, Photon, TraceOptions, trace_part};
+use caustics_trace::{EmissionPlan, Photon, PhotonStream, TraceOptions};
 
 use crate::caustics::CausticsOptions;
 use crate::error::CausticsError;
@@ -42,8 +42,9 @@ pub enum Quantum {
 /// Photons of a pass are kept as long as they are no more than `max_photons`; of larger passes only
 /// the picture is, so that memory stays bounded however long it runs.
 ///
-/// Photons come in slices, so footprints are not checked against their neighbours
-/// ([`TraceOptions::check_footprints`]).
+/// Photons come in slices; the last rows of each slice wait for the next, so that footprints are
+/// checked against all their neighbours ([`TraceOptions::check_footprints`]) and a whole pass is what
+/// [`Caustics`](crate::Caustics) shows for as many photons.
 ///
 /// With [`Estimate::Nearest`] the number of nearest photons grows as the total to the power of 2/3,
 /// so that the radius shrinks while more photons are in it, as in stochastic progressive photon
@@ -86,6 +87,7 @@ struct Pass {
     options: TraceOptions,
     /// Photons traced of it.
     done: u32,
+    stream: PhotonStream,
     photons: Vec<Photon>,
     /// Which pass it is of those that are as large as passes can be: 0 while they grow.
     repeat: u32,
@@ -176,6 +178,8 @@ impl Progressive {
         // A pass whose photons are gone begins again.
         if self.pass.options.photons > self.max_photons {
             self.pass.done = 0;
+            self.pass.stream = PhotonStream::default();
+            self.pass.photons = Vec::new();
         }
         self.view = Some(view);
         Ok(())
@@ -259,24 +263,24 @@ impl Progressive {
         self.traced
     }
 
-    /// Photons in memory, those of the pass on its way included: at most twice `max_photons`
-    /// times the photons that land for each that is emitted.
+    /// Photons in memory, those of the pass on its way included: at most twice `max_photons` and a
+    /// few rows of a lattice, times the photons that land for each that is emitted.
     #[must_use]
     pub fn photons_in_memory(&self) -> usize {
-        self.kept.len() + self.pass.photons.len()
+        self.kept.len() + self.pass.photons.len() + self.pass.stream.waiting()
     }
 
     fn trace_slice(&mut self, slice: u32) -> Result<u32, CausticsError> {
         let total = self.pass.plan.count();
-        let range = self.pass.done..total.min(self.pass.done.saturating_add(slice));
-        let traced = range.len() as u32;
-        let part = trace_part(
+        let traced = slice.min(total - self.pass.done);
+        let part = self.pass.stream.advance(
             &self.world,
             &self.intersector,
             &self.pass.plan,
             &self.pass.options,
-            range,
+            traced,
         )?;
+        let is_first = self.pass.done == 0;
         self.pass.done += traced;
         let is_kept = self.pass.options.photons <= self.max_photons;
         if is_kept {
@@ -284,7 +288,7 @@ impl Progressive {
         } else if let Some(view) = &mut self.view {
             let (image, _) = splat(&view.buffer, &part.photons, &self.options.footprint)?;
             match &mut view.growing {
-                Some(sum) if self.pass.done > traced => add(sum, &image, 1.0),
+                Some(sum) if !is_first => add(sum, &image, 1.0),
                 growing => *growing = Some(image),
             }
         }
@@ -392,8 +396,6 @@ impl Pass {
         options: &CausticsOptions,
     ) -> Result<Self, CausticsError> {
         let options = TraceOptions {
-            // A slice of a pass does not know the neighbours of its last photons.
-            check_footprints: false,
             photons: FIRST_PASS,
             ..options.trace
         };
@@ -410,6 +412,7 @@ impl Pass {
             plan: EmissionPlan::new(world, intersector, &options)?,
             options,
             done: 0,
+            stream: PhotonStream::default(),
             photons: Vec::new(),
             repeat,
         })

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use caustics::filter::relative_mse;
 use caustics::prelude::*;
 use caustics::sampling::{PointSet, Sequence};
-use caustics::trace::trace_photons;
+use caustics::trace::{Fate, trace_photons};
 use caustics_benches::stage::{Failure, Stage};
 use glam::Vec3;
 
@@ -19,6 +19,7 @@ const PHOTONS_EACH: u32 = 4096;
 
 const SIZE: u32 = 256;
 const CENTER: Vec3 = Vec3::new(0.0, 0.8, 0.0);
+const BALL: f32 = 0.5;
 const LAMP: Vec3 = Vec3::new(0.0, 5.0, 0.0);
 
 /// The flux of all lamps, in W.
@@ -29,24 +30,25 @@ pub(crate) fn section() -> Result<String, Failure> {
         "## Lights that grow\n\n\
         A glass ball of 0.5 m under a disc of growing radius, 4.2 m above it, with the same flux: \
         {PHOTONS} photons, against {PLACES} point lights spread over the disc, with \
-        {PHOTONS_EACH} photons each and the intensity that the disc has towards the ball's middle \
-        (so that they differ by up to 1 % in brightness across it). *Energy* is the sum of one picture \
-        over that of the other.\n\n\
-        | radius in metres | relMSE | energy | brightest pixel, W/(sr m²) |\n\
-        | --: | --: | --: | --: |\n"
+        {PHOTONS_EACH} photons each and as much flux to the ball as the disc's part there sends it \
+        (evenly instead of by the cosine: a difference of up to 1 % across the ball). *Energy* is the \
+        sum of one picture over that of the other, *flux* the same of what lands.\n\n\
+        | radius in metres | relMSE | energy | flux | brightest pixel, W/(sr m²) |\n\
+        | --: | --: | --: | --: | --: |\n"
     );
     let camera = camera_over(Vec3::ZERO)?;
     for radius in [0.01f32, 0.1, 0.3, 0.8] {
         let area = std::f32::consts::PI * radius * radius;
         let radiance = FLUX / (std::f32::consts::PI * area);
         let disc = Light::disc(LAMP, [0.0, -1.0, 0.0], radius, [radiance; 3])?;
-        let view = View::new(&balls(&[CENTER], 0.5, &[disc])?, &camera, SIZE)?;
+        let view = View::new(&balls(&[CENTER], BALL, &[disc])?, &camera, SIZE)?;
         let options = TraceOptions {
             photons: PHOTONS,
             ..TraceOptions::default()
         };
         let map = trace_photons(&view.world, &view.rays, &options, &|_| {})?;
         let soft = view.caustics(&map.photons)?;
+        let soft_flux = map.ledger.entry(Fate::Stored).flux.x;
 
         let mut points = Vec::new();
         let places = PointSet::new(Sequence::Halton, PLACES, 0);
@@ -54,11 +56,14 @@ pub(crate) fn section() -> Result<String, Failure> {
             let place = disc
                 .point_on(places.point(index))
                 .ok_or("a disc has an area")?;
-            let cosine = (place.position - CENTER).normalize().y;
+            let from_ball = place.position - CENTER;
+            // As much to the whole ball as a cosine about its middle brings.
+            let sine = BALL / from_ball.length();
+            let cosine = from_ball.normalize().y * 0.5 * (1.0 + (1.0 - sine * sine).sqrt());
             let intensity = radiance * area * cosine / PLACES as f32;
             points.push(Light::point(place.position, [intensity; 3])?);
         }
-        let view = View::new(&balls(&[CENTER], 0.5, &points)?, &camera, SIZE)?;
+        let view = View::new(&balls(&[CENTER], BALL, &points)?, &camera, SIZE)?;
         let options = TraceOptions {
             photons: PLACES * PHOTONS_EACH,
             ..TraceOptions::default()
@@ -68,9 +73,10 @@ pub(crate) fn section() -> Result<String, Failure> {
         let brightest = soft.pixels().iter().map(|it| it[0]).fold(0.0, f32::max);
         writeln!(
             text,
-            "| {radius} | {:.5} | {:.4} | {brightest:.2} |",
+            "| {radius} | {:.5} | {:.4} | {:.4} | {brightest:.2} |",
             relative_mse(&soft, &many)?,
-            soft.mean() / many.mean()
+            soft.mean() / many.mean(),
+            soft_flux / map.ledger.entry(Fate::Stored).flux.x
         )?;
         eprintln!("  {radius}");
     }
