@@ -5,12 +5,13 @@ mod common;
 
 use std::f64::consts::{PI, TAU};
 
+use caustics_geometry::shapes::quad;
 use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::{CounterRng, PointSet, Sequence};
 use caustics_scene::{Light, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
 use caustics_trace::{Aim, Casters, Emission, EmissionSample, Emitter};
-use common::scenes::{add_floor, add_sphere};
+use common::scenes::{add_floor, add_mesh, add_sphere};
 use proptest::prelude::*;
 
 const BALL: Sphere = Sphere {
@@ -220,6 +221,37 @@ fn flux_is_even_over_the_rays_of_every_light() {
             statistic > limit(freedom),
             "{statistic} of {freedom}: {light:?}"
         );
+    }
+}
+
+/// An emissive panel of two triangles, and an emissive ball, shine as the lights of their shape do.
+#[test]
+fn flux_is_even_over_the_rays_of_emissive_objects() {
+    let ball = Light::sphere([0.4, 2.0, 0.3], 0.7, [2.0; 3]).expect("a valid light");
+    for light in [panel(), ball] {
+        let mut scene = Scene::new();
+        add_floor(&mut scene, -1.0, 3.0);
+        let lamp = Material::diffuse("lamp", [0.0; 3]).with_emission([2.0; 3]);
+        match light {
+            Light::Rectangle { corner, edges, .. } => {
+                let mesh = quad(corner, edges[0], edges[1]).expect("a panel");
+                add_mesh(&mut scene, "panel", mesh, lamp);
+            }
+            Light::Sphere { center, radius, .. } => add_sphere(&mut scene, center, radius, lamp),
+            _ => unreachable!("these two"),
+        }
+        let world = World::new(&scene).expect("a small world");
+        let emitters = emitters(&world, Aim::Everywhere);
+        let [emitter] = &emitters[..] else {
+            panic!("one side of one object shines");
+        };
+        let flux = light.flux().expect("an area");
+        let error = (emitter.power().x / f64::from(flux.x) - 1.0).abs();
+        assert!(error < 1e-5, "{error:e}");
+        let photons = random_photons(&world, emitter, 200_000, 2);
+        let (statistic, freedom) = chi_square(&light, &world, &photons, emitter.power().x);
+        println!("{statistic:.1} of {freedom}");
+        assert!(statistic < limit(freedom), "{statistic} of {freedom}");
     }
 }
 

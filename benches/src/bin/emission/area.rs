@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use caustics::filter::relative_mse;
+use caustics::filter::{Image, relative_mse};
 use caustics::prelude::*;
 use caustics::sampling::{PointSet, Sequence};
+use caustics::scene::Environment;
 use caustics::trace::{Fate, trace_photons};
 use caustics_benches::stage::{Failure, Stage};
 use glam::Vec3;
@@ -19,6 +20,9 @@ const PHOTONS_EACH: u32 = 4096;
 
 const SIZE: u32 = 256;
 const CENTER: Vec3 = Vec3::new(0.0, 0.8, 0.0);
+/// Photons of the picture under a sky that others are held against.
+const TRUE_SKY: u32 = 1 << 21;
+
 const BALL: f32 = 0.5;
 const LAMP: Vec3 = Vec3::new(0.0, 5.0, 0.0);
 
@@ -108,7 +112,45 @@ pub(crate) fn section() -> Result<String, Failure> {
             errors[0].0, errors[1].0, errors[0].1, errors[1].1
         )?;
     }
+    writeln!(
+        text,
+        "\nThe ball under a sky whose one bright spot of 5 by 5 degrees has half of its light, against \
+        {TRUE_SKY} photons:\n\n\
+        | photons | relMSE | energy |\n| --: | --: | --: |"
+    )?;
+    let mut scene = balls(&[CENTER], BALL, &[])?;
+    scene.set_environment(Some(sky()?));
+    let view = View::new(&scene, &camera, SIZE)?;
+    let pictured = |photons: u32| -> Result<Image, Failure> {
+        let options = TraceOptions {
+            photons,
+            ..TraceOptions::default()
+        };
+        let map = trace_photons(&view.world, &view.rays, &options, &|_| {})?;
+        view.caustics(&map.photons)
+    };
+    let truth = pictured(TRUE_SKY)?;
+    for photons in [1u32 << 14, 1 << 16, 1 << 18] {
+        let image = pictured(photons)?;
+        writeln!(
+            text,
+            "| {photons} | {:.5} | {:.4} |",
+            relative_mse(&image, &truth)?,
+            image.mean() / truth.mean()
+        )?;
+    }
     Ok(text)
+}
+
+/// Even light from everywhere, and as much again from one spot.
+fn sky() -> Result<Environment, Failure> {
+    let (width, height) = (72u32, 36u32);
+    let mut pixels = vec![[1.0; 3]; (width * height) as usize];
+    let row = 10;
+    let edge = |row: u32| (std::f32::consts::PI * row as f32 / height as f32).cos();
+    let angle = std::f32::consts::TAU / width as f32 * (edge(row) - edge(row + 1));
+    pixels[(row * width + 40) as usize] = [4.0 * std::f32::consts::PI / angle; 3];
+    Ok(Environment::new(width, height, pixels)?)
 }
 
 /// The Cornell box as it is, and with a rectangle of the same radiance in place of its emissive quad.

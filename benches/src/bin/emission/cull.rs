@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use caustics::accel::Intersect;
 use caustics::filter::{Image, relative_mse};
 use caustics::prelude::*;
 use caustics::render::{FootprintOptions, GBuffer, splat};
@@ -104,20 +105,32 @@ fn exceeded_by(mut values: Vec<f32>, part: f64) -> f32 {
     values[((values.len() as f64 * part) as usize).min(values.len() - 1)]
 }
 
-/// The camera itself, or one in its place with a narrower view of the middle of the photons.
-fn towards(camera: &Camera, photons: &[Photon], zoom: f32) -> Result<Camera, Failure> {
+/// The camera itself, or one in its place with a narrower view of the brightest spot of its picture.
+fn towards(case: &Case<'_>, camera: &Camera, zoom: f32) -> Result<Camera, Failure> {
     let Projection::Perspective { yfov } = camera.projection else {
         return Err("the camera sees no pixels".into());
     };
     if zoom == 1.0 {
         return Ok(camera.clone());
     }
-    let weight: f32 = photons.iter().map(|it| it.flux.x).sum();
-    let sum: Vec3 = photons.iter().map(|it| it.flux.x * it.position).sum();
+    let (width, height) = (case.image.width(), case.image.height());
+    let (brightest, _) = (0u32..)
+        .zip(case.image.pixels())
+        .max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
+        .ok_or("a picture has pixels")?;
+    let at = [brightest % width, brightest / width].map(|it| it as f32 + 0.5);
+    let ray = camera.ray(at[0], at[1], width, height);
+    let hit = case.stage.intersector.closest_hit(&ray);
+    let target = ray.at(hit.ok_or("light lies on something")?.t);
     let up: Vec3 = camera.transform.matrix3.y_axis.into();
     let narrow = 2.0 * ((0.5 * yfov).tan() / zoom).atan();
-    let (eye, middle) = (camera.position(), sum / weight);
-    Ok(Camera::look_at("near", eye, middle, up, narrow)?)
+    Ok(Camera::look_at(
+        "near",
+        camera.position(),
+        target,
+        up,
+        narrow,
+    )?)
 }
 
 pub(crate) fn section() -> Result<String, Failure> {
@@ -127,7 +140,7 @@ pub(crate) fn section() -> Result<String, Failure> {
         saved, flux lost, and relMSE to the reference. All is off by default. Depth is the most \
         surfaces that a path meets; least flux in means of the stored photons' own; area and \
         solid angle such that they drop the widest 0.1 to 50 % of footprints (solid angles also in \
-        pixels); the view is the camera's, and narrower ones of the caustic's middle, whose \
+        pixels); the view is the camera's, and narrower ones of its brightest spot, whose \
         references are pictures of {} aimed photons. Only depth saves rays: \
         the others save memory, uploads and drawing.\n\n\
         ![what culling saves and costs](emission-cull.svg)\n\n\
@@ -188,7 +201,7 @@ pub(crate) fn section() -> Result<String, Failure> {
         };
         let many = trace_photons(&stage.world, &stage.intersector, &many, &|_| {})?;
         for zoom in ZOOMS {
-            let camera = towards(&stage.camera, &case.all.photons, zoom)?;
+            let camera = towards(&case, &stage.camera, zoom)?;
             let near = Case::new(&stage, &camera)?;
             let (truth, _) = splat(&near.buffer, &many.photons, &FootprintOptions::default())?;
             let culling = Culling {

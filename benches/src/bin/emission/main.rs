@@ -5,12 +5,14 @@
 //! cargo run --release -p caustics-benches --bin emission [section ...]
 //! ```
 //!
-//! Sections are `aim`, `frames`, `share`, `progressive`, `area` and `cull`; those that are not named stay as
+//! Sections are `aim`, `frames`, `share`, `progressive`, `area`, `cull` and
+//! `compact`; those that are not named stay as
 //! they are. All take some minutes. Every number but the seconds is the same on any machine.
 
 mod aim;
 mod area;
 mod chart;
+mod compact;
 mod converge;
 mod cull;
 mod frames;
@@ -33,13 +35,14 @@ seconds are of two threads of a shared one, so compare them only within a table.
 
 type Section = fn() -> Result<String, Failure>;
 
-const SECTIONS: [(&str, Section); 6] = [
+const SECTIONS: [(&str, Section); 7] = [
     ("aim", aim::section),
     ("frames", frames::section),
     ("share", share::section),
     ("progressive", converge::section),
     ("area", area::section),
     ("cull", cull::section),
+    ("compact", compact::section),
 ];
 
 fn main() -> Result<(), Failure> {
