@@ -54,7 +54,8 @@ pub struct TraceOptions {
     /// Where the lights aim.
     pub aim: Aim,
     /// The least number of photons that each pair of a light and a caster gets, as a part of an
-    /// equal share: a strong light does not starve a weak one. In 0..=1.
+    /// equal share: a strong light does not starve a weak one. In 0..=1. The default is the largest of
+    /// those measured in `docs/emission.md` that costs the strong one at most a quarter in error.
     pub share_floor: f32,
     /// The points that choose emission directions and positions.
     pub sequence: Sequence,

@@ -342,6 +342,31 @@ fn flat_lights_send_a_ball_what_the_closed_form_says() {
     }
 }
 
+/// The same of photons that stand on a lattice in direction and on a sequence in place.
+#[test]
+fn a_lattice_sends_a_ball_what_the_closed_form_says() {
+    for (height, reach) in [(1.5f64, 0.8f64), (4.2, 0.1), (4.2, 0.8)] {
+        let over = BALL.center + height as f32 * Vec3::Y;
+        let disc = Light::disc(over, [0.0, -1.0, 0.0], reach as f32, [2.0; 3]);
+        let world = world(disc.expect("a valid light"));
+        let emitter = &emitters(&world, Aim::Casters)[0];
+        let radius = f64::from(BALL.radius);
+        let angle = TAU * (1.0 - height / height.hypot(reach));
+        let exact = PI * 2.0 * radius * radius * angle;
+        for count in [4096, 40_000, 131_072] {
+            let points = PointSet::new(Sequence::Grid, count, 0);
+            let flux: f64 = (0..count)
+                .filter_map(|index| emitter.emit::<4>(&world, &EmissionSample::of(&points, index)))
+                .filter(meets_ball)
+                .map(|photon| f64::from(photon.flux.x))
+                .sum();
+            let error = flux / exact - 1.0;
+            println!("{height} {reach} {count}: {error:e}");
+            assert!(error.abs() < 2e-3, "{error:e}");
+        }
+    }
+}
+
 #[test]
 fn a_shining_ball_sends_as_much_aimed_as_unaimed() {
     for radius in [0.05, 0.7, 1.4] {

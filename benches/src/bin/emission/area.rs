@@ -16,7 +16,7 @@ const PHOTONS: u32 = 1 << 17;
 
 /// Point lights that stand for an area, each with so many photons.
 const PLACES: u32 = 256;
-const PHOTONS_EACH: u32 = 4096;
+const PHOTONS_EACH: u32 = 16_384;
 
 const SIZE: u32 = 256;
 const CENTER: Vec3 = Vec3::new(0.0, 0.8, 0.0);
