@@ -120,7 +120,8 @@ pub(crate) fn section() -> Result<String, Failure> {
         many times as many rays and seconds reach the same relMSE (of all but the worst 1 % of pixels) into cones around each caster, \
         and everywhere. *Apart* is the relMSE between the pictures of aimed and of unaimed photons, \
         with as many of the latter as meet glass as often (at most {LIMIT}); the second is with \
-        eight times as many of both. *Over* is more than {LIMIT} photons. The last scene has three \
+        eight times as many of both. *Over* is more than {LIMIT} photons; \
+        below 1, fewer photons happened to come out better. The last scene has three \
         balls, two lamps and a sun whose cones and rectangles overlap; its reference is \
         {TRUE_PHOTONS} aimed photons.\n\n\
         | scene | relMSE | million rays | seconds | rays, cones | rays, everywhere | \

@@ -98,7 +98,10 @@ impl Axis {
             low = low.floor();
             high = high.ceil().max(low + 1.0);
         } else {
-            low = low.min(0.0);
+            // From zero on, unless that leaves most of the panel empty.
+            if low < 0.5 * high {
+                low = low.min(0.0);
+            }
             high = high.max(low + 1e-9);
         }
         Self {

@@ -187,7 +187,7 @@ pub(crate) fn section() -> Result<String, Failure> {
         for part in WIDEST {
             let max_area = exceeded_by(case.all.photons.iter().map(area).collect(), part);
             let culling = Culling { max_area, ..off };
-            let limit = format!("{:.2e} m²", max_area);
+            let limit = format!("{max_area:.2e} m²");
             rows.push((2, limit, case.outcome(culling, deep, &stage.reference)?));
         }
         let height = stage.reference.height();
