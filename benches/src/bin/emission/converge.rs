@@ -119,8 +119,11 @@ pub(crate) fn section() -> Result<String, Failure> {
         `{EXACT}`, to {TRUE_PHOTONS} photons of another seed, and the seconds of tracing and drawing up to it, with footprints checked against their neighbours \
         and not. Photons of passes up to {KEPT} are kept, of larger ones only pictures; *kept* is \
         the most that were in memory so far. References end at a noise of their own, of 0.0001 to \
-        0.003, which that many photons do not have. Of smooth light the error of footprints falls faster than as one over the photons, at \
-        edges as slowly as their root; the dashed lines are one over the photons.\n\n\
+        0.003, which that many photons do not have. Under waves the error falls as one over the \
+        photons, which the dashed lines are, over three decades; in the other two scenes more slowly, \
+        by their edges and what their references are off. Checked footprints have less error at few \
+        photons under the waves and behind the sphere, and more in the pool. Other programs shared \
+        the machine, so that seconds are several times those of an idle one.\n\n\
         ![error against photons and seconds](emission-progressive.svg)\n\n\
         | scene | estimate | checked | photons | seconds | relMSE | kept |\n\
         | --- | --- | --- | --: | --: | --: | --: |\n"
@@ -143,7 +146,7 @@ pub(crate) fn section() -> Result<String, Failure> {
             if (shown.photons / 4096).ilog2() % 2 == 0 && shown.photons.is_power_of_two() {
                 writeln!(
                     text,
-                    "| {name} | {} | {} | {} | {:.2} | {:.5} | {} |",
+                    "| {name} | {} | {} | {} | {:.2} | {:.1e} | {} |",
                     estimate.name(),
                     if is_checked { "yes" } else { "no" },
                     shown.photons,
