@@ -150,10 +150,12 @@ pub(crate) fn section() -> Result<String, Failure> {
         25 % of footprints (solid angles also in pixels); the *view* is the camera's, and narrower \
         ones of its brightest spot, whose references are pictures of {} aimed photons.\n\n\
         Only depth saves rays: the others save memory, uploads and drawing. A view drops nothing that \
-        its picture shows. Thinning by flux keeps the light, but picks survivors at random, and the \
-        gaps between them cost the more the more are thinned. Dropping wide footprints loses their \
-        light for good: cheap where they are the faint rest of a caustic, as behind a glass, and dear \
-        where all are alike, as under waves.\n\n\
+        its picture shows. Thinning by flux keeps the light and widens the survivors: for as many footprints saved \
+        it costs less than dropping the widest, but they are picked at random, and the gaps \
+        between them cost the more the more are thinned. Dropping wide footprints loses their \
+        light for good: only the widest few in a hundred are cheap to lose, where they are the \
+        faint rest of a caustic as behind the glass, and not where all are alike, as under \
+        waves.\n\n\
         ![what culling saves and costs](emission-cull.svg)\n\n\
         | scene | option | limit | rays saved | footprints saved | flux lost | relMSE | without |\n\
         | --- | --- | --: | --: | --: | --: | --: | --: |\n",
