@@ -5,42 +5,42 @@ use caustics_sampling::warp::square_to_disc_concentric;
 use caustics_scene::Environment;
 use glam::Vec2;
 
-use crate::area_emission::NARROWING;
-use crate::emission::{Emission, EmissionSample, differential};
+use crate::differential::{BLUR_EDGE, RayDifferential};
+use crate::emission::{Emission, EmissionSample};
 
 /// A photon from the sky, from a direction by importance, at a place that is even over the
 /// cross-section of the target.
 ///
-/// Its neighbours in direction turn about the place where it crosses the disc around the target's
-/// middle, so that they meet the target where it does. Of its four-dimensional cell it has as much in
-/// direction as blurs a caustic as far as its part in position does, at a distance of the target's
-/// own radius: where a bright spot of the sky is sampled finely, most of the cell is position's, as
-/// for a sun.
+/// Positions are the lattice's steps, as for a sun; directions, a [`BLUR_EDGE`] of the square that the
+/// inverse of their density spans, are what blurs: little where the sky has a bright spot. They turn
+/// about the place where the photon crosses the disc around the target's middle.
 pub(crate) fn emit<const N: usize>(
     sky: &Environment,
     target: &Sphere,
     distance: f32,
     sample: &EmissionSample,
 ) -> Option<Emission<N>> {
-    let from = sky.sample(sample.point);
+    let from = sky.sample(sample.place);
     if !(from.pdf > 0.0 && from.pdf.is_finite()) {
         return None;
     }
     let frame = Frame::from_normal(from.towards);
     let across = |it: Vec2| frame.to_world((target.radius * it).extend(0.0));
-    let place = square_to_disc_concentric(sample.place);
+    let place = square_to_disc_concentric(sample.point);
     let area = PI * target.radius * target.radius;
     let count = sample.count as f32;
-    let places = (count * PI * from.pdf).sqrt().clamp(1.0, count);
-    let edge = NARROWING * places.sqrt().recip();
-    let angle = NARROWING * (places / (from.pdf * count)).sqrt();
+    let edge = count.sqrt().recip();
+    let angle = BLUR_EDGE * from.pdf.sqrt().recip();
     let turned = [angle * frame.tangent, angle * frame.bitangent];
-    let mut differential = differential(
-        &[edge * across(place.d_du), edge * across(place.d_dv)],
-        &turned,
-    );
-    for (moved, turned) in differential.position.iter_mut().zip(turned) {
-        *moved = -distance * turned;
+    let steps = [edge * across(place.d_du), edge * across(place.d_dv)];
+    // The steps come first, as for every light with four parameters.
+    let mut differential = RayDifferential::ZERO;
+    let moved = steps.into_iter().chain(turned.map(|it| -distance * it));
+    for (slot, moved) in differential.position.iter_mut().zip(moved) {
+        *slot = moved;
+    }
+    for (slot, turned) in differential.direction.iter_mut().skip(2).zip(turned) {
+        *slot = turned;
     }
     Some(Emission {
         ray: Ray::new(

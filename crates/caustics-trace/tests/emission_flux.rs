@@ -10,7 +10,7 @@ use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::{CounterRng, PointSet, Sequence};
 use caustics_scene::{Light, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
-use caustics_trace::{Aim, Casters, Emission, EmissionSample, Emitter};
+use caustics_trace::{Aim, BLUR_EDGE, Casters, Emission, EmissionSample, Emitter};
 use common::scenes::{add_floor, add_mesh, add_sphere};
 use proptest::prelude::*;
 
@@ -451,12 +451,11 @@ proptest! {
                 prop_assert_eq!(other, Vec3::ZERO);
             }
         }
-        // Alike in both of a pair, and together the photon's share of the domain, narrowed to a
-        // fifth in each parameter.
+        // Alike in both of a pair: a lattice's step of directions, and a part of the places.
         for [one, other] in factors {
             prop_assert!((one / other - 1.0).abs() < 1e-2, "{one} {other}");
         }
         let share = factors[0][0] * factors[1][0] * f64::from(count).sqrt();
-        prop_assert!((share / 0.04 - 1.0).abs() < 1e-2, "{share}");
+        prop_assert!((share / f64::from(BLUR_EDGE) - 1.0).abs() < 1e-2, "{share}");
     }
 }

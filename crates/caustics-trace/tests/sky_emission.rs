@@ -10,7 +10,7 @@ use caustics_sampling::CounterRng;
 use caustics_scene::{Environment, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
 use caustics_trace::{
-    Aim, Casters, Emission, EmissionDomain, EmissionSample, Emitter, LightSource,
+    Aim, BLUR_EDGE, Casters, Emission, EmissionDomain, EmissionSample, Emitter, LightSource,
 };
 use common::relative_error;
 use common::scenes::{add_floor, add_sphere};
@@ -174,9 +174,9 @@ proptest! {
         ..ProptestConfig::with_cases(2_000)
     })]
 
-    /// In its last two parameters a ray moves as the map of places does. In its first two it turns
-    /// about where it crosses the disc, alike in all directions, by as much as the directions of its
-    /// part of the sky spread.
+    /// In its first two parameters a ray moves as the map of places does, by the lattice's steps. In
+    /// its last two it turns about where it crosses the disc, alike in all directions, by a part of
+    /// what the directions of its part of the sky spread.
     #[test]
     fn differentials_are_those_of_the_maps(
         aim in prop_oneof![Just(Aim::Everywhere), Just(Aim::Casters)],
@@ -191,7 +191,7 @@ proptest! {
             panic!("the emitter of a sky");
         };
         let (point, place) = (Vec2::new(point.0, point.1), Vec2::new(place.0, place.1));
-        let off = place - Vec2::splat(0.5);
+        let off = point - Vec2::splat(0.5);
         let creases = [off.x, off.y, off.x + off.y, off.x - off.y];
         prop_assume!(creases.iter().all(|it| it.abs() > 4.0 * STEP));
         let sample = EmissionSample { point, spacing: [Vec2::ZERO; 2], place, count };
@@ -204,14 +204,14 @@ proptest! {
             (4.0 * difference(STEP) - difference(2.0 * STEP)) / 3.0
         };
         let moved = |by: Vec2| {
-            let sample = EmissionSample { place: place + by, ..sample };
+            let sample = EmissionSample { point: point + by, ..sample };
             let emission = emitter.emit::<4>(&world, &sample).expect("light");
             emission.ray.origin.as_dvec3()
         };
         let mut factors = [0.0; 2];
         for (axis, factor) in [Vec2::X, Vec2::Y].into_iter().zip(&mut factors) {
             let exact = slope(&moved, axis);
-            let index = 2 + usize::from(axis == Vec2::Y);
+            let index = usize::from(axis == Vec2::Y);
             let found = emission.differential.position[index].as_dvec3();
             *factor = found.dot(exact) / exact.length_squared();
             // Of coordinates of some metres, of which the step is a part.
@@ -220,12 +220,15 @@ proptest! {
             prop_assert!(error < 1e-3 + rounding, "{error:e}");
             prop_assert_eq!(emission.differential.direction[index], Vec3::ZERO);
         }
-        prop_assert!((factors[0] / factors[1] - 1.0).abs() < 1e-2);
+        for factor in factors {
+            let steps = factor * f64::from(count).sqrt();
+            prop_assert!((steps - 1.0).abs() < 1e-2, "{steps}");
+        }
 
         // The directions of two samples nearby, where they are of one texel, spread by the
         // reciprocal of the density.
         let sky = world.environment().expect("a sky");
-        let here = sky.sample(point);
+        let here = sky.sample(place);
         let around = [Vec2::X, Vec2::NEG_X, Vec2::Y, Vec2::NEG_Y].map(|it| 2.0 * STEP * it);
         let texel = |towards: Vec3| {
             let turn = towards.x.atan2(-towards.z) / std::f32::consts::TAU + 0.5;
@@ -233,22 +236,21 @@ proptest! {
             (row as u32, (turn * WIDTH as f32) as u32)
         };
         let own = texel(here.towards);
-        prop_assume!(around.iter().all(|by| texel(sky.sample(point + *by).towards) == own));
-        let towards = |by: Vec2| sky.sample(point + by).towards.as_dvec3();
+        prop_assume!(around.iter().all(|by| texel(sky.sample(place + *by).towards) == own));
+        let towards = |by: Vec2| sky.sample(place + by).towards.as_dvec3();
         let spread = slope(&towards, Vec2::X).cross(slope(&towards, Vec2::Y)).length();
         prop_assert!((spread * f64::from(here.pdf) - 1.0).abs() < 1e-2, "{spread}");
-        let [first, second] = [0, 1].map(|it| emission.differential.direction[it]);
+        let [first, second] = [2, 3].map(|it| emission.differential.direction[it]);
         let turned = f64::from(first.cross(second).length());
-        let share = turned / spread * factors[0] * factors[1] * f64::from(count);
-        // Narrowed to a fifth in each of four parameters.
-        prop_assert!((share / 0.0016 - 1.0).abs() < 0.02, "{share}");
+        let part = turned / spread / f64::from(BLUR_EDGE).powi(2);
+        prop_assert!((part - 1.0).abs() < 0.02, "{part}");
         prop_assert!((first.length() / second.length() - 1.0).abs() < 1e-3);
         for turned in [first, second] {
             prop_assert!(turned.dot(emission.ray.direction).abs() < 1e-5 * turned.length());
         }
         // At the disc the neighbours in direction are where the photon is.
         let ahead = (target.center - emission.ray.origin).dot(emission.ray.direction);
-        for parameter in 0..2 {
+        for parameter in 2..4 {
             let differential = &emission.differential;
             let there = differential.position[parameter] + ahead * differential.direction[parameter];
             let reach = ahead * differential.direction[parameter].length();
