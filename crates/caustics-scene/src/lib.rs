@@ -40,7 +40,7 @@
 //! | --- | --- |
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
 //! | [`Brdf`] | how receivers reflect: Lambertian, or glTF's metallic-roughness model |
-//! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, discs and balls that shine |
+//! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, triangles, discs and balls that shine |
 //! | [`Environment`] | light from all around |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
@@ -83,6 +83,7 @@ pub mod gltf;
 mod instanced;
 mod intersector;
 mod light;
+mod light_check;
 mod light_point;
 mod material;
 mod point_on;
@@ -97,7 +98,8 @@ pub use caustics_accel::{AccelError, BvhOptions, Intersect};
 pub use environment::{Environment, EnvironmentError, EnvironmentSample};
 pub use instanced::InstancedIntersector;
 pub use intersector::SceneIntersector;
-pub use light::{Light, LightError};
+pub use light::Light;
+pub use light_check::LightError;
 pub use light_point::LightPoint;
 pub use material::{MAX_ATTENUATION, Material, MaterialError, Surface};
 pub use scene::{Instance, MaterialId, MeshId, Scene, SceneError, Shape};

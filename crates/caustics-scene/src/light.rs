@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI};
-use thiserror::Error;
+
+use crate::light_check::{LightError, finite, has_area, is_radius, is_unit, positive, unit};
 
 /// A light that no ray can hit.
 ///
@@ -61,6 +62,13 @@ pub enum Light {
         corner: Vec3,
         /// The two edges from there, in metres; not parallel.
         edges: [Vec3; 2],
+        /// Radiance, RGB, in W/(sr m^2).
+        radiance: Vec3,
+    },
+    /// A triangle that shines to the side from which its corners go round counter-clockwise.
+    Triangle {
+        /// Its corners, in metres; not on one line.
+        corners: [Vec3; 3],
         /// Radiance, RGB, in W/(sr m^2).
         radiance: Vec3,
     },
@@ -165,6 +173,22 @@ impl Light {
         light.validate().map(|()| light)
     }
 
+    /// A triangle with these corners in metres, which shines with this radiance in W/(sr m^2) to the
+    /// side from which they go round counter-clockwise.
+    ///
+    /// # Errors
+    /// A number is not finite, a radiance is negative, or the corners span no area.
+    pub fn triangle(
+        corners: [impl Into<Vec3>; 3],
+        radiance: impl Into<Vec3>,
+    ) -> Result<Self, LightError> {
+        let light = Self::Triangle {
+            corners: corners.map(Into::into),
+            radiance: radiance.into(),
+        };
+        light.validate().map(|()| light)
+    }
+
     /// A disc of this radius in metres, which shines with this radiance in W/(sr m^2) to the side of
     /// `normal` (of any length).
     ///
@@ -222,6 +246,7 @@ impl Light {
             } => intensity * spot_falloff(axis.dot(direction), inner_cos, outer_cos),
             Self::Directional { .. }
             | Self::Rectangle { .. }
+            | Self::Triangle { .. }
             | Self::Disc { .. }
             | Self::Sphere { .. } => Vec3::ZERO,
         }
@@ -248,6 +273,7 @@ impl Light {
             }
             Self::Directional { .. } => None,
             Self::Rectangle { radiance, .. }
+            | Self::Triangle { radiance, .. }
             | Self::Disc { radiance, .. }
             | Self::Sphere { radiance, .. } => self.area().map(|area| PI * area * radiance),
         }
@@ -301,6 +327,11 @@ impl Light {
                 has_area(self.area())?;
                 positive(radiance)
             }
+            Self::Triangle { corners, radiance } => {
+                corners.into_iter().try_for_each(finite)?;
+                has_area(self.area())?;
+                positive(radiance)
+            }
             Self::Disc {
                 center,
                 normal,
@@ -331,113 +362,6 @@ impl Light {
 fn spot_falloff(cos: f32, inner_cos: f32, outer_cos: f32) -> f32 {
     let t = ((cos - outer_cos) / (inner_cos - outer_cos)).clamp(0.0, 1.0);
     t * t
-}
-
-fn unit(direction: Vec3) -> Result<Vec3, LightError> {
-    // Scaled first, so that neither tiny nor huge vectors lose their length in its square.
-    let largest = direction.abs().max_element();
-    if direction.is_finite() && largest > 0.0 {
-        Ok((direction / largest).normalize())
-    } else {
-        Err(LightError::Direction {
-            direction: direction.to_array(),
-        })
-    }
-}
-
-fn is_unit(direction: Vec3) -> Result<(), LightError> {
-    // A NaN is not normalised either.
-    if direction.is_normalized() {
-        Ok(())
-    } else {
-        Err(LightError::Direction {
-            direction: direction.to_array(),
-        })
-    }
-}
-
-fn finite(position: Vec3) -> Result<(), LightError> {
-    if position.is_finite() {
-        Ok(())
-    } else {
-        Err(LightError::Position {
-            position: position.to_array(),
-        })
-    }
-}
-
-fn positive(intensity: Vec3) -> Result<(), LightError> {
-    match intensity
-        .to_array()
-        .into_iter()
-        .find(|v| !(v.is_finite() && *v >= 0.0))
-    {
-        Some(value) => Err(LightError::Intensity { value }),
-        None => Ok(()),
-    }
-}
-
-fn is_radius(radius: f32) -> Result<(), LightError> {
-    if radius > 0.0 && radius.is_finite() {
-        Ok(())
-    } else {
-        Err(LightError::Radius { radius })
-    }
-}
-
-fn has_area(area: Option<f32>) -> Result<(), LightError> {
-    match area {
-        Some(area) if !(area >= f32::MIN_POSITIVE && area.is_finite()) => {
-            Err(LightError::Area { area })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A light that makes no physical sense.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum LightError {
-    /// A coordinate that is not finite.
-    #[error("position {position:?} is not finite")]
-    Position {
-        /// The position.
-        position: [f32; 3],
-    },
-    /// A direction that is zero, not finite, or, in a light put together by hand, not of unit
-    /// length.
-    #[error("direction {direction:?} is not a usable unit vector")]
-    Direction {
-        /// The direction.
-        direction: [f32; 3],
-    },
-    /// An intensity or irradiance that is negative or not finite.
-    #[error("intensity {value} is not a finite number of at least 0")]
-    Intensity {
-        /// The offending channel.
-        value: f32,
-    },
-    /// A radius that is not above zero or not finite.
-    #[error("radius {radius} is not a finite number above 0")]
-    Radius {
-        /// The radius, in metres.
-        radius: f32,
-    },
-    /// A shape whose area is zero (edges that are parallel, lengths whose square is too small for
-    /// an f32) or not finite.
-    #[error("area {area} is not a finite number above 0")]
-    Area {
-        /// The area, in square metres.
-        area: f32,
-    },
-    /// Cone angles out of range or out of order.
-    #[error("cone angles {inner} and {outer} break 0 <= inner < outer <= pi/2")]
-    ConeAngles {
-        /// Where the light begins to fall off, in radians.
-        inner: f32,
-        /// Where it ends, in radians.
-        outer: f32,
-    },
 }
 
 #[cfg(test)]
@@ -524,6 +448,16 @@ mod tests {
             let light = Light::rectangle([0.0; 3], edges, radiance);
             assert_eq!(light.is_ok(), is_valid, "{edges:?}");
         }
+        for (corners, is_valid) in [
+            ([[0.0; 3], x, z], true),
+            ([[0.0; 3], x, [2.0, 0.0, 0.0]], false),
+            ([[0.0; 3], x, [0.0, f32::NAN, 0.0]], false),
+            ([[0.0; 3], [1e30, 0.0, 0.0], [0.0, 0.0, 1e30]], false),
+        ] {
+            let light = Light::triangle(corners, radiance);
+            assert_eq!(light.is_ok(), is_valid, "{corners:?}");
+        }
+        assert!(Light::triangle([[0.0; 3], x, z], [-1.0; 3]).is_err());
         for (radius, is_valid) in [(1.0, true), (0.0, false), (-1.0, false), (f32::NAN, false)] {
             let disc = Light::disc([0.0; 3], z, radius, radiance);
             assert_eq!(disc.is_ok(), is_valid, "{radius}");

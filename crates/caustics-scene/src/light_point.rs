@@ -19,6 +19,10 @@ impl Light {
     pub fn area(&self) -> Option<f32> {
         match *self {
             Self::Rectangle { edges, .. } => Some(edges[0].cross(edges[1]).length()),
+            Self::Triangle { corners, .. } => {
+                let [a, b, c] = corners;
+                Some(0.5 * (b - a).cross(c - a).length())
+            }
             Self::Disc { radius, .. } => Some(PI * radius * radius),
             Self::Sphere { radius, .. } => Some(4.0 * PI * radius * radius),
             _ => None,
@@ -31,6 +35,7 @@ impl Light {
     pub fn radiance(&self) -> Vec3 {
         match *self {
             Self::Rectangle { radiance, .. }
+            | Self::Triangle { radiance, .. }
             | Self::Disc { radiance, .. }
             | Self::Sphere { radiance, .. } => radiance,
             _ => Vec3::ZERO,
@@ -40,7 +45,8 @@ impl Light {
     /// The point of a light with an area at a sample of the unit square, mapped so that equal areas
     /// of the one have equal areas of the other; `None` for a light without area.
     ///
-    /// A disc by polar coordinates, a ball by Archimedes' map of the cylinder.
+    /// A triangle by folding the square's root (Turk, *Graphics Gems*, 1990), a disc by polar
+    /// coordinates, a ball by Archimedes' map of the cylinder.
     ///
     /// ```
     /// use caustics_scene::Light;
@@ -59,6 +65,16 @@ impl Light {
                 position: corner + sample.x * edges[0] + sample.y * edges[1],
                 normal: edges[0].cross(edges[1]).normalize(),
             }),
+            Self::Triangle {
+                corners: [a, b, c], ..
+            } => {
+                let root = sample.x.clamp(0.0, 1.0).sqrt();
+                let (u, v) = (root * (1.0 - sample.y), root * sample.y);
+                Some(LightPoint {
+                    position: a + u * (b - a) + v * (c - a),
+                    normal: (b - a).cross(c - a).normalize(),
+                })
+            }
             Self::Disc {
                 center,
                 normal,
@@ -94,13 +110,14 @@ mod tests {
     use approx::assert_relative_eq;
     use glam::DVec3;
 
-    fn lights() -> [Light; 3] {
+    fn lights() -> [Light; 4] {
         let (a, b) = (Vec3::new(1.0, 0.2, -0.3), Vec3::new(-0.4, 1.5, 0.1));
         let normal = Vec3::new(0.3, -1.0, 0.5);
         [
             Light::rectangle([0.3, 2.0, -1.0], [a, b], [1.0; 3]).unwrap(),
             Light::disc([0.1, 1.0, 0.0], normal, 0.7, [1.0; 3]).unwrap(),
             Light::sphere([-0.2, 0.5, 0.4], 1.3, [1.0; 3]).unwrap(),
+            Light::triangle([Vec3::Y, Vec3::Y + a, Vec3::Y + b], [1.0; 3]).unwrap(),
         ]
     }
 
@@ -134,7 +151,7 @@ mod tests {
 
     #[test]
     fn flux_is_pi_area_radiance() {
-        let [panel, disc, ball] = lights();
+        let [panel, disc, ball, triangle] = lights();
         assert_relative_eq!(disc.flux().unwrap().x, PI * PI * 0.49, max_relative = 1e-6);
         assert_relative_eq!(
             ball.flux().unwrap().y,
@@ -142,6 +159,11 @@ mod tests {
             max_relative = 1e-6
         );
         let square = Light::rectangle([0.0; 3], [2.0 * Vec3::X, Vec3::Z], [0.0, 0.0, 3.0]).unwrap();
+        assert_relative_eq!(
+            triangle.flux().unwrap().x,
+            0.5 * panel.flux().unwrap().x,
+            max_relative = 1e-6
+        );
         assert_eq!(square.flux(), Some(Vec3::new(0.0, 0.0, 6.0 * PI)));
         assert_eq!(panel.intensity_towards(Vec3::Y), Vec3::ZERO);
     }

@@ -2,7 +2,8 @@
 
 use crate::camera::{Camera, CameraError};
 use crate::environment::Environment;
-use crate::light::{Light, LightError};
+use crate::light::Light;
+use crate::light_check::LightError;
 use crate::material::{Material, MaterialError};
 use caustics_geometry::{MeshError, Sphere, SphereError, TriangleMesh};
 use glam::{Affine3A, Mat3A, Vec3};

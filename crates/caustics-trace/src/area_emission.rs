@@ -2,7 +2,7 @@ use std::f32::consts::PI;
 
 use caustics_geometry::{Frame, Ray, SpawnPoint, Sphere};
 use caustics_sampling::warp::{
-    Cone, WarpSample, square_to_cosine_hemisphere, square_to_disc_concentric,
+    Cone, WarpSample, square_to_cosine_hemisphere, square_to_disc_concentric, square_to_triangle,
 };
 use caustics_scene::{Light, World};
 use glam::{Vec2, Vec3};
@@ -21,6 +21,15 @@ pub enum AreaSurface {
         corner: Vec3,
         /// The edges from there, in metres.
         edges: [Vec3; 2],
+        /// The unit normal of the side that shines.
+        normal: Vec3,
+        /// Radiance, in W/(sr m²).
+        radiance: Vec3,
+    },
+    /// A triangle, by [`square_to_triangle`].
+    Triangle {
+        /// Its corners, in metres.
+        corners: [Vec3; 3],
         /// The unit normal of the side that shines.
         normal: Vec3,
         /// Radiance, in W/(sr m²).
@@ -92,6 +101,15 @@ impl AreaSurface {
                     radiance,
                 })
             }
+            Light::Triangle { corners, radiance } => {
+                let [a, b, c] = corners;
+                let normal = (b - a).cross(c - a).try_normalize()?;
+                faces(a, normal).then_some(Self::Triangle {
+                    corners,
+                    normal,
+                    radiance,
+                })
+            }
             Light::Disc {
                 center,
                 normal,
@@ -137,6 +155,9 @@ impl AreaSurface {
     pub fn area(&self, world: &World) -> f32 {
         match self {
             Self::Rectangle { edges, .. } => edges[0].cross(edges[1]).length(),
+            Self::Triangle {
+                corners: [a, b, c], ..
+            } => 0.5 * (b - a).cross(c - a).length(),
             Self::Disc { radius, .. } => PI * radius * radius,
             Self::Cap { radius, cone, .. } => cone.solid_angle() * radius * radius,
             Self::Object { emitter, .. } => world
@@ -151,6 +172,7 @@ impl AreaSurface {
     pub fn radiance(&self, world: &World) -> Vec3 {
         match self {
             Self::Rectangle { radiance, .. }
+            | Self::Triangle { radiance, .. }
             | Self::Disc { radiance, .. }
             | Self::Cap { radiance, .. } => *radiance,
             Self::Object { emitter, .. } => world
@@ -200,6 +222,16 @@ impl AreaSurface {
                 normal: *normal,
                 derivatives: Some(*edges),
             }),
+            Self::Triangle {
+                corners, normal, ..
+            } => {
+                let warped = square_to_triangle(sample, *corners);
+                Some(Place {
+                    spawn: SpawnPoint::free(warped.value),
+                    normal: *normal,
+                    derivatives: Some([warped.d_du, warped.d_dv]),
+                })
+            }
             Self::Disc {
                 center,
                 frame,

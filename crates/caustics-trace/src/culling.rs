@@ -1,12 +1,18 @@
-use caustics_scene::Camera;
+use caustics_sampling::CounterRng;
+use caustics_scene::{Camera, Projection};
 use glam::{Vec3, Vec4};
 
-use crate::ledger::Fate;
+use crate::ledger::{EnergyLedger, Fate};
+use crate::photon::Photon;
 
 /// How far a footprint lights, in lengths of its axes: the widest kernel ends at 1.8 of them.
 const REACH: f32 = 2.0;
 
 /// Which photons are not stored though they land: nothing by default. The ledger counts every one.
+///
+/// Photons are culled last, when their footprints have been checked against all that landed beside
+/// them, so that those that are kept are what they are without culling. What is dropped is light lost;
+/// `docs/emission.md` has what each saves and costs.
 ///
 /// ```
 /// use caustics_trace::{Culling, TraceOptions};
@@ -26,6 +32,9 @@ pub struct Culling {
     /// metres, are dropped and booked as [`Fate::Wide`]: light that is spread so thin that a host
     /// may do without. Infinite turns it off.
     pub max_area: f32,
+    /// Photons whose footprint is wider than this, as an eye sees it, are dropped and booked as
+    /// [`Fate::Wide`].
+    pub max_solid_angle: Option<SolidAngleLimit>,
     /// Photons whose footprint lies outside this view are dropped and booked as
     /// [`Fate::Unseen`]. They may still be seen in mirrors and through glass, and are gone for any
     /// other camera.
@@ -37,8 +46,42 @@ impl Default for Culling {
         Self {
             min_flux: 0.0,
             max_area: f32::INFINITY,
+            max_solid_angle: None,
             view: None,
         }
+    }
+}
+
+/// The widest footprint that is kept, as an eye sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidAngleLimit {
+    /// Where the eye is, in metres.
+    pub eye: Vec3,
+    /// The solid angle of the parallelogram of the footprint's axes, in steradians; at least 0.
+    pub steradians: f32,
+}
+
+impl SolidAngleLimit {
+    /// So many pixels in the middle of a camera's picture; `None` where its rays are parallel, so
+    /// that [`Culling::max_area`] says the same.
+    #[must_use]
+    pub fn of_pixels(camera: &Camera, height: u32, pixels: f32) -> Option<Self> {
+        let Projection::Perspective { yfov } = camera.projection else {
+            return None;
+        };
+        let edge = 2.0 * (0.5 * yfov).tan() / height as f32;
+        Some(Self {
+            eye: camera.position(),
+            steradians: pixels * edge * edge,
+        })
+    }
+
+    fn exceeded_by(&self, photon: &Photon) -> bool {
+        let to_eye = self.eye - photon.position;
+        let distance = to_eye.length();
+        let across = photon.axes[0].cross(photon.axes[1]).dot(to_eye).abs();
+        // Of a small parallelogram; beside the eye it is infinite.
+        across > self.steradians * distance * distance * distance
     }
 }
 
@@ -85,14 +128,55 @@ impl ViewVolume {
 }
 
 impl Culling {
-    /// Why a photon with this footprint is not stored, if it is not.
-    pub(crate) fn rejects(&self, position: Vec3, axes: &[Vec3; 2]) -> Option<Fate> {
+    /// Whether a photon that has been booked as stored stays; it may be given more flux and a wider
+    /// footprint. What is lost is booked anew.
+    pub(crate) fn keeps(&self, photon: &mut Photon, ledger: &mut EnergyLedger) -> bool {
+        if let Some(fate) = self.rejects(photon) {
+            ledger.rebook(fate, photon.flux);
+            return false;
+        }
+        let survival = photon.flux.max_element() / self.min_flux;
+        if survival < 1.0 {
+            // Of a stream of its own, so that no other photon depends on it.
+            let [x, y, z] = photon.position.to_array().map(|it| u64::from(it.to_bits()));
+            let way = u64::from(photon.incoming.x.to_bits());
+            let mut rng = CounterRng::new(x << 32 | y, z << 32 | way);
+            if rng.next_f32() >= survival {
+                ledger.rebook(Fate::Roulette, photon.flux);
+                return false;
+            }
+            let more = photon.flux / survival;
+            ledger.gain(more - photon.flux);
+            ledger.strengthen(more - photon.flux);
+            photon.flux = more;
+            // Survivors stand farther apart.
+            photon.axes = photon.axes.map(|axis| survival.sqrt().recip() * axis);
+        }
+        true
+    }
+
+    /// Drops from `photons` what is not kept.
+    pub(crate) fn apply(&self, photons: &mut Vec<Photon>, ledger: &mut EnergyLedger) {
+        if *self != Self::default() {
+            photons.retain_mut(|photon| self.keeps(photon, ledger));
+        }
+    }
+
+    /// Why a photon is dropped, if it is.
+    fn rejects(&self, photon: &Photon) -> Option<Fate> {
+        let axes = &photon.axes;
         if self.max_area < f32::INFINITY && axes[0].cross(axes[1]).length() > self.max_area {
+            return Some(Fate::Wide);
+        }
+        if self
+            .max_solid_angle
+            .is_some_and(|limit| limit.exceeded_by(photon))
+        {
             return Some(Fate::Wide);
         }
         let reach = || REACH * (axes[0].length() + axes[1].length());
         match &self.view {
-            Some(view) if !view.meets(position, reach()) => Some(Fate::Unseen),
+            Some(view) if !view.meets(photon.position, reach()) => Some(Fate::Unseen),
             _ => None,
         }
     }

@@ -159,6 +159,67 @@ impl Lattice {
         [along, [below, above]].map(|pair| pair.map(|it| self.index_of(it?)))
     }
 
+    /// Of a grid whose first `traced` used points are known: how many of them have all their
+    /// neighbours known, and from which point on they are neighbours of others.
+    pub(crate) fn settled(&self, traced: u32) -> (u32, u32) {
+        if traced >= self.count {
+            return (self.count, self.count);
+        }
+        let grid = Grid::new(self.points.count());
+        let next = self.number(traced);
+        let cell = grid.cell(next);
+        // The row before the next point's has neighbours in it; the one before that has none.
+        let first_of_row = next - cell.column;
+        let Some(before) = cell.row.checked_sub(1) else {
+            return (0, 0);
+        };
+        let first_before = first_of_row - grid.columns(before);
+        let needed = before
+            .checked_sub(1)
+            .map_or(0, |row| self.used_before(first_before - grid.columns(row)));
+        (self.used_before(first_before), needed)
+    }
+
+    /// Some of the used points, as a lattice of their own that has no others.
+    pub(crate) fn window(&self, used: std::ops::Range<u32>) -> Self {
+        let count = used.len() as u32;
+        let spans = match &self.spans {
+            None => vec![Span {
+                first: used.start,
+                before: 0,
+            }],
+            Some(spans) => {
+                let start = spans.partition_point(|it| it.before <= used.start).max(1) - 1;
+                let end = spans.partition_point(|it| it.before < used.end);
+                let clipped = spans.get(start..end).unwrap_or_default().iter();
+                clipped
+                    .map(|span| Span {
+                        first: span.first + used.start.saturating_sub(span.before),
+                        before: span.before.saturating_sub(used.start),
+                    })
+                    .collect()
+            }
+        };
+        Self {
+            points: self.points,
+            spans: Some(spans),
+            count,
+        }
+    }
+
+    /// How many used points have smaller numbers.
+    fn used_before(&self, number: u32) -> u32 {
+        let Some(spans) = &self.spans else {
+            return number.min(self.count);
+        };
+        let after = spans.partition_point(|it| it.first < number);
+        let Some(span) = after.checked_sub(1).and_then(|it| spans.get(it)) else {
+            return 0;
+        };
+        let end = spans.get(after).map_or(self.count, |next| next.before);
+        end.min(span.before + (number - span.first))
+    }
+
     /// Which used point number `number` of the whole set is.
     fn index_of(&self, number: u32) -> Option<u32> {
         let Some(spans) = &self.spans else {
@@ -247,6 +308,51 @@ mod tests {
                 across,
                 2 * count - grid.columns(0) - grid.columns(grid.rows() - 1)
             );
+        }
+    }
+
+    #[test]
+    fn windows_have_the_neighbours_of_the_whole() {
+        let bits = |cell: u32| cell % 7 < 4 && cell % 11 != 3;
+        let spans = |count: u32| {
+            let (mut spans, mut before, mut last) = (Vec::new(), 0, None);
+            for number in (0..count).filter(|it| bits(*it)) {
+                if last != Some(number.wrapping_sub(1)) {
+                    spans.push(Span {
+                        first: number,
+                        before,
+                    });
+                }
+                last = Some(number);
+                before += 1;
+            }
+            (spans, before)
+        };
+        for count in [7, 64, 90, 1000] {
+            let (spans, used) = spans(count);
+            let marked = Lattice {
+                points: PointSet::new(Sequence::Grid, count, 0),
+                spans: Some(spans),
+                count: used,
+            };
+            for lattice in [Lattice::whole(Sequence::Grid, count, 0), marked] {
+                let (mut given, mut kept) = (0, 0);
+                for traced in 0..=lattice.count() {
+                    let (settled, needed) = lattice.settled(traced);
+                    assert!(given <= settled && kept <= needed && needed <= settled);
+                    let window = lattice.window(kept..traced);
+                    assert_eq!(window.count(), traced - kept);
+                    for index in given..settled {
+                        let whole = lattice.neighbours(index);
+                        let found = window.neighbours(index - kept);
+                        assert_eq!(window.number(index - kept), lattice.number(index));
+                        let shifted = found.map(|pair| pair.map(|it| Some(it? + kept)));
+                        assert_eq!(shifted, whole, "{count}: {index} in {kept}..{traced}");
+                    }
+                    (given, kept) = (settled, needed);
+                }
+                assert_eq!(given, lattice.count());
+            }
         }
     }
 

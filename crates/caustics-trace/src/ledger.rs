@@ -1,5 +1,7 @@
 use glam::{DVec3, Vec3};
 
+use crate::photon::Photon;
+
 /// What became of a photon's flux.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -23,7 +25,8 @@ pub enum Fate {
     Direct,
     /// Cut off at the maximum depth.
     TooDeep,
-    /// Landed with a footprint larger than [`Culling::max_area`](crate::Culling::max_area).
+    /// Landed with a footprint larger than [`Culling::max_area`](crate::Culling::max_area) or
+    /// [`Culling::max_solid_angle`](crate::Culling::max_solid_angle).
     Wide,
     /// Landed outside [`Culling::view`](crate::Culling::view).
     Unseen,
@@ -184,6 +187,28 @@ impl EnergyLedger {
     /// Books flux that a surviving path was given.
     pub fn gain(&mut self, flux: Vec3) {
         self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// Books flux anew that was booked as stored.
+    pub(crate) fn rebook(&mut self, fate: Fate, flux: Vec3) {
+        self.fates[Fate::Stored as usize].retract(&LedgerEntry {
+            count: 1,
+            flux: flux.as_dvec3(),
+        });
+        self.book(fate, flux);
+    }
+
+    /// Counts as stored just these photons.
+    pub(crate) fn store(&mut self, photons: &[Photon]) {
+        self.fates[Fate::Stored as usize] = LedgerEntry::default();
+        for photon in photons {
+            self.book(Fate::Stored, photon.flux);
+        }
+    }
+
+    /// Adds flux to a stored photon.
+    pub(crate) fn strengthen(&mut self, flux: Vec3) {
+        self.fates[Fate::Stored as usize].flux += flux.as_dvec3();
     }
 
     /// What one photon did, as a short list, and back.

@@ -59,11 +59,12 @@
 //! | aim lights at what makes caustics | [`Aim`], [`Casters`], [`Emitter`], [`EmissionDomain`], [`AreaSurface`], [`LightSource`] | |
 //! | share photons among lights and casters, the same in every frame | [`EmissionPlan`], [`EmissionBatch`], [`trace_plan`], [`trace_part`] | |
 //! | keep photons from frame to frame, and trace anew what a change demands | [`LivePhotons`], [`Change`] | |
+//! | trace them in parts | [`PhotonStream`] | |
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | emit more finely where paths part, in still pictures | [`Refinement`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
-//! | leave out what a host can do without | [`Culling`], [`ViewVolume`] | |
+//! | leave out what a host can do without | [`Culling`], [`ViewVolume`], [`SolidAngleLimit`] | |
 //! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
 //! | know where the rest went | [`EnergyLedger`], [`Fate`], [`LedgerEntry`] | |
 //! | carry derivatives along any path, from a light or the eye | [`RayDifferential`] | Igehy 1999 |
@@ -121,11 +122,13 @@ mod compact;
 mod culling;
 mod differential;
 mod domain;
+mod domain_reuse;
 mod emission;
 mod emitter;
 mod lattice;
 mod ledger;
 mod live;
+mod live_chunk;
 mod media;
 mod neighbours;
 mod optics;
@@ -138,6 +141,7 @@ mod refine;
 mod scatter;
 mod silhouette;
 mod sky_emission;
+mod stream;
 mod trace;
 mod traced;
 mod tracer;
@@ -146,7 +150,7 @@ mod trail;
 pub use area_emission::AreaSurface;
 pub use casters::{Casters, MAX_CASTERS};
 pub use compact::{CompactFootprint, CompactPhoton};
-pub use culling::{Culling, ViewVolume};
+pub use culling::{Culling, SolidAngleLimit, ViewVolume};
 pub use differential::{BLUR_EDGE, RayDifferential};
 pub use domain::EmissionDomain;
 pub use emission::{Emission, EmissionSample};
@@ -164,4 +168,5 @@ pub use photon::{FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
+pub use stream::PhotonStream;
 pub use trace::{PhotonTrail, trace_part, trace_photon, trace_photons, trace_plan};

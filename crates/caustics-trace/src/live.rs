@@ -4,19 +4,16 @@ use caustics_scene::World;
 
 use crate::emission::EmissionSample;
 use crate::emitter::LightSource;
-use crate::ledger::{EnergyLedger, Fate, LedgerEntry};
+use crate::ledger::Fate;
+use crate::live_chunk::{Chunk, Stale};
 use crate::options::{TraceError, TraceOptions};
-use crate::photon::{Photon, PhotonMap};
+use crate::photon::PhotonMap;
 use crate::plan::EmissionPlan;
 use crate::trace::Batch;
-use crate::traced::Traced;
 use crate::trail::{Space, Trail};
 
 /// Points of an emitter's set whose photons are kept together.
 const CHUNK: u32 = 2048;
-
-/// The golden section of 2^32: its multiples, modulo that, spread evenly at any count.
-const GOLDEN: u32 = 0x9E37_79B9;
 
 /// What is different in a world from the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,75 +62,6 @@ pub struct LivePhotons {
     batches: Vec<Vec<Chunk>>,
     /// Where in the order of multiples of the golden section the next refresh begins.
     turn: u32,
-}
-
-/// Photons of consecutive points.
-#[derive(Clone, Debug, Default)]
-struct Chunk {
-    records: Vec<Record>,
-    photons: Vec<Photon>,
-    /// For each photon, what its path met.
-    paths: Vec<u32>,
-    bookings: Vec<Booking>,
-}
-
-/// What is remembered of one emitted photon.
-#[derive(Clone, Copy, Debug)]
-struct Record {
-    /// Of its point.
-    number: u32,
-    /// Where its stored photons end, in its chunk.
-    photons_end: u32,
-    /// Where its bookings end.
-    bookings_end: u32,
-    touched: u32,
-    passed: u64,
-    rays: u32,
-    fallbacks: u16,
-    bounded: u16,
-}
-
-/// A line of one photon's ledger.
-#[derive(Clone, Copy, Debug)]
-struct Booking {
-    line: u8,
-    count: u32,
-    flux: glam::Vec3,
-}
-
-/// Which of the photons of a pair are traced anew.
-#[derive(Clone, Copy)]
-struct Stale {
-    /// Casters that count as moved, a bit each.
-    touched: u32,
-    /// Blocks of space in which something changed.
-    passed: u64,
-    /// Those whose turn it is: their distance from the first in the golden order.
-    first: u32,
-    turns: u64,
-    /// Those that reached no caster.
-    unmet: bool,
-    all: bool,
-}
-
-impl Stale {
-    const NONE: Self = Self {
-        touched: 0,
-        passed: 0,
-        first: 0,
-        turns: 0,
-        unmet: false,
-        all: false,
-    };
-
-    fn holds(&self, record: &Record) -> bool {
-        let turn = record.number.wrapping_mul(GOLDEN).wrapping_sub(self.first);
-        self.all
-            || record.touched & self.touched != 0
-            || record.passed & self.passed != 0
-            || (self.unmet && record.touched == 0)
-            || u64::from(turn) < self.turns
-    }
 }
 
 impl LivePhotons {
@@ -242,6 +170,8 @@ impl LivePhotons {
             for (planned, chunks) in of_light.iter().zip(batches.by_ref()) {
                 let mut traced = Chunk::joined(chunks);
                 traced.check_footprints(&self.options, planned);
+                let culling = &self.options.culling;
+                culling.apply(&mut traced.photons, &mut traced.ledger);
                 map.photons.append(&mut traced.photons);
                 map.ledger.merge(&traced.ledger);
             }
@@ -423,84 +353,4 @@ fn renewed<I: Intersect + ?Sized, const N: usize>(
         next.note(number, touched, passed, &ledger);
     }
     (next, traced)
-}
-
-impl Chunk {
-    /// Chunks in their order as one.
-    fn joined(chunks: &[Self]) -> Traced {
-        let mut all = Traced {
-            photons: Vec::new(),
-            paths: Vec::new(),
-            starts: Vec::new(),
-            ledger: EnergyLedger::default(),
-        };
-        for chunk in chunks {
-            let mut start = all.photons.len();
-            let base = start;
-            for record in &chunk.records {
-                all.starts.push(start);
-                start = base + record.photons_end as usize;
-            }
-            all.photons.extend_from_slice(&chunk.photons);
-            all.paths.extend_from_slice(&chunk.paths);
-            chunk.book(&mut all.ledger);
-        }
-        all
-    }
-
-    /// Takes over a photon of another chunk.
-    fn keep(&mut self, old: &Self, index: usize) {
-        let starts = index.checked_sub(1).map_or((0, 0), |it| {
-            let before = &old.records[it];
-            (before.photons_end, before.bookings_end)
-        });
-        let record = &old.records[index];
-        let photons = starts.0 as usize..record.photons_end as usize;
-        self.photons
-            .extend_from_slice(&old.photons[photons.clone()]);
-        self.paths.extend_from_slice(&old.paths[photons]);
-        self.bookings
-            .extend_from_slice(&old.bookings[starts.1 as usize..record.bookings_end as usize]);
-        self.records.push(Record {
-            photons_end: self.photons.len() as u32,
-            bookings_end: self.bookings.len() as u32,
-            ..*record
-        });
-    }
-
-    /// Remembers a photon that has just been traced.
-    fn note(&mut self, number: u32, touched: u32, passed: u64, ledger: &EnergyLedger) {
-        self.bookings
-            .extend(ledger.lines().map(|(line, entry)| Booking {
-                line,
-                count: entry.count as u32,
-                flux: entry.flux.as_vec3(),
-            }));
-        let small = |count: u64| u16::try_from(count).unwrap_or(u16::MAX);
-        self.records.push(Record {
-            number,
-            photons_end: self.photons.len() as u32,
-            bookings_end: self.bookings.len() as u32,
-            touched,
-            passed,
-            rays: ledger.rays as u32,
-            fallbacks: small(ledger.normal_fallbacks),
-            bounded: small(ledger.bounded_differentials),
-        });
-    }
-
-    fn book(&self, ledger: &mut EnergyLedger) {
-        for booking in &self.bookings {
-            let entry = LedgerEntry {
-                count: u64::from(booking.count),
-                flux: booking.flux.as_dvec3(),
-            };
-            ledger.add_line(booking.line, &entry);
-        }
-        for record in &self.records {
-            ledger.rays += u64::from(record.rays);
-            ledger.normal_fallbacks += u64::from(record.fallbacks);
-            ledger.bounded_differentials += u64::from(record.bounded);
-        }
-    }
 }

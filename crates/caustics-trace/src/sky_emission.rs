@@ -5,14 +5,15 @@ use caustics_sampling::warp::square_to_disc_concentric;
 use caustics_scene::Environment;
 use glam::Vec2;
 
-use crate::differential::BLUR_EDGE;
-use crate::emission::{Emission, EmissionSample, differential};
+use crate::differential::{BLUR_EDGE, RayDifferential};
+use crate::emission::{Emission, EmissionSample};
 
 /// A photon from the sky, from a direction by importance, at a place that is even over the
 /// cross-section of the target.
 ///
 /// Positions are the lattice's steps, as for a sun; directions, a [`BLUR_EDGE`] of the square that the
-/// inverse of their density spans, are what blurs: little where the sky has a bright spot.
+/// inverse of their density spans, are what blurs: little where the sky has a bright spot. They turn
+/// about the place where the photon crosses the disc around the target's middle.
 pub(crate) fn emit<const N: usize>(
     sky: &Environment,
     target: &Sphere,
@@ -30,15 +31,23 @@ pub(crate) fn emit<const N: usize>(
     let count = sample.count as f32;
     let edge = count.sqrt().recip();
     let angle = BLUR_EDGE * from.pdf.sqrt().recip();
+    let turned = [angle * frame.tangent, angle * frame.bitangent];
+    let steps = [edge * across(place.d_du), edge * across(place.d_dv)];
+    // The steps come first, as for every light with four parameters.
+    let mut differential = RayDifferential::ZERO;
+    let moved = steps.into_iter().chain(turned.map(|it| -distance * it));
+    for (slot, moved) in differential.position.iter_mut().zip(moved) {
+        *slot = moved;
+    }
+    for (slot, turned) in differential.direction.iter_mut().skip(2).zip(turned) {
+        *slot = turned;
+    }
     Some(Emission {
         ray: Ray::new(
             target.center + distance * from.towards + across(place.value),
             -from.towards,
         ),
         flux: from.radiance * (area / (from.pdf * count)),
-        differential: differential(
-            &[edge * across(place.d_du), edge * across(place.d_dv)],
-            &[angle * frame.tangent, angle * frame.bitangent],
-        ),
+        differential,
     })
 }

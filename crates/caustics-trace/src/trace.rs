@@ -63,14 +63,13 @@ pub fn trace_plan<I: Intersect + ?Sized>(
                 let detail =
                     options.refinement.detail * world.specular_bounds().diagonal().length();
                 let mut refined = trace_refined(&batch, levels, detail, progress);
+                options
+                    .culling
+                    .apply(&mut refined.photons, &mut refined.ledger);
                 map.photons.append(&mut refined.photons);
                 map.ledger.merge(&refined.ledger);
-            } else if !options.differentials {
-                batch.trace::<0>(&mut map, 0..planned.count(), progress);
-            } else if planned.emitter().dimensions() == 2 {
-                batch.trace::<2>(&mut map, 0..planned.count(), progress);
             } else {
-                batch.trace::<4>(&mut map, 0..planned.count(), progress);
+                batch.trace(&mut map, 0..planned.count(), progress);
             }
         }
         if let Some(first) = of_light.first() {
@@ -86,8 +85,8 @@ pub fn trace_plan<I: Intersect + ?Sized>(
 ///
 /// Over ranges that join to all of them, photons and ledgers are those of [`trace_plan`], but for
 /// what is not aimed at, which no ledger of a part has, and but for footprints, which are checked
-/// against their neighbours only in a part that has all photons of a pair: for a host that has a few milliseconds in
-/// each frame, or that hands photons on as they come.
+/// against their neighbours only in a part that has all photons of a pair. A host that takes all
+/// photons in their order loses neither with [`PhotonStream`](crate::PhotonStream).
 ///
 /// # Errors
 /// If the options are out of range. Those that ask for a [`Refinement`](crate::Refinement) are taken
@@ -115,13 +114,7 @@ pub fn trace_part<I: Intersect + ?Sized>(
             let count = planned.count();
             let within = photons.start.saturating_sub(first).min(count)
                 ..photons.end.saturating_sub(first).min(count);
-            if !options.differentials {
-                batch.trace::<0>(&mut map, within, &|_| {});
-            } else if planned.emitter().dimensions() == 2 {
-                batch.trace::<2>(&mut map, within, &|_| {});
-            } else {
-                batch.trace::<4>(&mut map, within, &|_| {});
-            }
+            batch.trace(&mut map, within, &|_| {});
             first = first.saturating_add(count);
         }
     }
@@ -212,13 +205,11 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
             .aimed_at(caster.map(|it| (self.plan.casters(), it)), self.earlier)
     }
 
-    /// Traces the photons with these numbers.
-    fn trace<const N: usize>(
+    fn trace_chunks<const N: usize>(
         &self,
-        map: &mut PhotonMap,
         photons: std::ops::Range<u32>,
         progress: &(dyn Fn(u32) + Sync),
-    ) {
+    ) -> Traced {
         let chunks = (photons.len() as u32).div_ceil(CHUNK);
         let run = |chunk: u32| {
             let start = photons.start + chunk * CHUNK;
@@ -236,8 +227,35 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         #[cfg(not(feature = "parallel"))]
         let parts: Vec<Traced> = (0..chunks).map(run).collect();
 
-        let mut all = Traced::joined(parts);
+        Traced::joined(parts)
+    }
+
+    /// Traces the photons with these numbers, on all threads.
+    pub(crate) fn traced(
+        &self,
+        photons: std::ops::Range<u32>,
+        progress: &(dyn Fn(u32) + Sync),
+    ) -> Traced {
+        if !self.options.differentials {
+            self.trace_chunks::<0>(photons, progress)
+        } else if self.planned.emitter().dimensions() == 2 {
+            self.trace_chunks::<2>(photons, progress)
+        } else {
+            self.trace_chunks::<4>(photons, progress)
+        }
+    }
+
+    /// The same, checked as far as all neighbours are among them, and culled.
+    fn trace(
+        &self,
+        map: &mut PhotonMap,
+        photons: std::ops::Range<u32>,
+        progress: &(dyn Fn(u32) + Sync),
+    ) {
+        let mut all = self.traced(photons, progress);
         all.check_footprints(self.options, self.planned);
+        let culling = &self.options.culling;
+        culling.apply(&mut all.photons, &mut all.ledger);
         map.photons.append(&mut all.photons);
         map.ledger.merge(&all.ledger);
     }
@@ -260,10 +278,19 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     fn trail<const N: usize>(&self, index: u32) -> PhotonTrail {
         let mut tracer = self.tracer::<N>();
         self.send(&mut tracer, index);
+        let culling = &self.options.culling;
+        let mut ledger = tracer.ledger;
+        let landed = tracer.photons.into_iter().zip(tracer.paths);
+        let (photons, paths) = landed
+            .filter_map(|(mut photon, path)| {
+                let is_kept = culling.keeps(&mut photon, &mut ledger);
+                is_kept.then_some((photon, path))
+            })
+            .unzip();
         PhotonTrail {
-            photons: tracer.photons,
-            paths: tracer.paths,
-            ledger: tracer.ledger,
+            photons,
+            paths,
+            ledger,
         }
     }
 

@@ -212,39 +212,14 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             self.ledger.book(Fate::Direct, branch.flux);
             return;
         }
-        let mut flux = branch.flux;
-        let mut axes = branch.differential.footprint_axes(point.geometric_normal);
-        let culling = &self.options.culling;
-        if let Some(fate) = culling.rejects(point.spawn.position, &axes) {
-            self.ledger.book(fate, flux);
-            return;
-        }
-        let survival = flux.max_element() / culling.min_flux;
-        if survival < 1.0 {
-            // Of a stream of its own, so that the path's other branches stay as they are.
-            let [x, y, z] = point
-                .spawn
-                .position
-                .to_array()
-                .map(|it| u64::from(it.to_bits()));
-            let mut rng = CounterRng::new(x << 32 | y, z << 32 | u64::from(branch.path));
-            if rng.next_f32() >= survival {
-                self.ledger.book(Fate::Roulette, flux);
-                return;
-            }
-            self.ledger.gain(flux / survival - flux);
-            flux /= survival;
-            // Survivors stand farther apart.
-            axes = axes.map(|axis| survival.sqrt().recip() * axis);
-        }
-        self.ledger.book(Fate::Stored, flux);
+        self.ledger.book(Fate::Stored, branch.flux);
         let side = if point.from_outside { 1.0 } else { -1.0 };
         self.photons.push(Photon {
             position: point.spawn.position,
             incoming: branch.ray.direction,
-            flux,
+            flux: branch.flux,
             normal: side * point.geometric_normal,
-            axes,
+            axes: branch.differential.footprint_axes(point.geometric_normal),
             object: point.object,
             events: branch.events,
             source: branch.source,

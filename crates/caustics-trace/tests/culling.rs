@@ -32,7 +32,6 @@ fn trace(culling: Culling) -> PhotonMap {
     let options = TraceOptions {
         photons: 20_000,
         culling,
-        check_footprints: false,
         ..TraceOptions::default()
     };
     let map = trace_photons(&world, &rays, &options, &|_| {}).expect("valid options");

@@ -299,12 +299,12 @@ proptest! {
         let four = RayDifferential { position: moved, direction: [Vec3::ZERO; 4] };
         let axes = four.footprint_axes(normal);
         let [steps, blurs] = [[moved[0], moved[1]], [moved[2], moved[3]]].map(|pair| {
-            let [one, other] = pair.map(|it| it.as_dvec3());
+            let [one, other] = pair.map(Vec3::as_dvec3);
             let squares = one.length_squared() + other.length_squared();
             one.cross(other).length().max(0.01 * squares)
         });
         let area = steps + 3.0 * (steps * blurs).sqrt();
-        let [one, other] = axes.map(|it| it.as_dvec3());
+        let [one, other] = axes.map(Vec3::as_dvec3);
         prop_assert!((one.cross(other).length() - area).abs() < 1e-5 * area);
         prop_assert!(one.dot(other).abs() < 1e-5 * area);
         prop_assert!((one.length_squared() - area).abs() < 1e-5 * area);

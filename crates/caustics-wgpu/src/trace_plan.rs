@@ -197,6 +197,8 @@ fn unsupported(options: &TraceOptions) -> Option<&'static str> {
         Some("photons that are culled by their flux (`Culling::min_flux`)")
     } else if options.culling.max_area != none.max_area {
         Some("photons that are culled by their footprint's area (`Culling::max_area`)")
+    } else if options.culling.max_solid_angle != none.max_solid_angle {
+        Some("photons that are culled by solid angle (`Culling::max_solid_angle`)")
     } else if options.culling.view != none.view {
         Some("photons that are culled by a view (`Culling::view`)")
     } else {
@@ -368,6 +370,11 @@ fn from_surface(
                 primitive_count: primitives.len() as u32,
                 ..mirror
             }
+        }
+        AreaSurface::Triangle { .. } => {
+            return Err(GpuError::Unsupported {
+                what: "a triangle that shines",
+            });
         }
         _ => {
             return Err(GpuError::Unsupported {

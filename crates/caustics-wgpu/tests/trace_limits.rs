@@ -8,7 +8,7 @@ mod common;
 
 use caustics_geometry::shapes::{heightfield, icosphere};
 use caustics_scene::{Camera, Environment, Instance, Light, Material, Scene, Shape, World};
-use caustics_trace::{Culling, Refinement, TraceOptions, ViewVolume};
+use caustics_trace::{Culling, Refinement, SolidAngleLimit, TraceOptions, ViewVolume};
 use caustics_wgpu::glam::{Affine3A, Vec3};
 use caustics_wgpu::{
     GpuError, PhotonBuffers, RendererError, SceneBuffers, SceneRefit, TraceCounters, TracePlan,
@@ -277,6 +277,13 @@ fn what_the_shaders_cannot_do_is_an_error() {
             },
         ),
         (
+            "max_solid_angle",
+            Culling {
+                max_solid_angle: SolidAngleLimit::of_pixels(&camera, 48, 9.0),
+                ..none
+            },
+        ),
+        (
             "view",
             Culling {
                 view: ViewVolume::of(&camera, 64, 48),
@@ -307,6 +314,14 @@ fn what_the_shaders_cannot_do_is_an_error() {
         let what = "light from an environment";
         assert_eq!(error, GpuError::Unsupported { what });
     }
+    let corners = [[0.0, 4.0, 0.0], [1.0, 4.0, 0.0], [0.0, 4.0, 1.0]];
+    let shining = lit(glass(), Light::triangle(corners, [1.0; 3]).unwrap());
+    assert_eq!(
+        TracePlan::new(&shining.world, &shining.rays, &options()).unwrap_err(),
+        GpuError::Unsupported {
+            what: "a triangle that shines"
+        }
+    );
     let heavy = TraceOptions {
         min_weight: 2.0,
         ..options()

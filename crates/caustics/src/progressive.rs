@@ -6,7 +6,7 @@ use caustics_render::{
     Visibility, render, splat,
 };
 use caustics_scene::{Camera, Scene, SceneIntersector, World};
-use caustics_trace::{EmissionPlan, Photon, TraceOptions, trace_part};
+use caustics_trace::{EmissionPlan, Photon, PhotonStream, TraceOptions};
 
 use crate::caustics::CausticsOptions;
 use crate::error::CausticsError;
@@ -20,6 +20,9 @@ const GROWTH: u32 = 2;
 /// Photons that are traced between two looks at the clock.
 const SLICE: u32 = 8192;
 
+/// Photons that are drawn at a time: as cheaply as all at once, and soon enough for a frame.
+const DRAWN: usize = 32_768;
+
 /// The part of new photons that the nearest ones grow by: alpha of Knaus and Zwicker, gamma of
 /// Hachisuka and Jensen (*Stochastic Progressive Photon Mapping*, SIGGRAPH Asia 2009), who take 2/3.
 const GAMMA: f64 = 2.0 / 3.0;
@@ -30,7 +33,8 @@ const GAMMA: f64 = 2.0 / 3.0;
 pub enum Quantum {
     /// Until so many photons have been traced.
     Photons(u32),
-    /// Until so much time has gone by; at least one slice of 8192 photons is traced.
+    /// Until so much time has gone by; at least one slice of 8192 photons is traced. What a slice
+    /// takes is what it may be exceeded by.
     Time(Duration),
 }
 
@@ -42,8 +46,12 @@ pub enum Quantum {
 /// Photons of a pass are kept as long as they are no more than `max_photons`; of larger passes only
 /// the picture is, so that memory stays bounded however long it runs.
 ///
-/// Photons come in slices, so footprints are not checked against their neighbours
-/// ([`TraceOptions::check_footprints`]).
+/// Photons come in slices; the last rows of each slice wait for the next, so that footprints are
+/// checked against all their neighbours ([`TraceOptions::check_footprints`]) and a whole pass is what
+/// [`Caustics`](crate::Caustics) shows for as many photons.
+///
+/// Footprints are drawn as they come, so that no quantum has more than some ten thousand to draw;
+/// nearest photons are looked up when a pass is whole, for the whole picture at once.
 ///
 /// With [`Estimate::Nearest`] the number of nearest photons grows as the total to the power of 2/3,
 /// so that the radius shrinks while more photons are in it, as in stochastic progressive photon
@@ -86,7 +94,11 @@ struct Pass {
     options: TraceOptions,
     /// Photons traced of it.
     done: u32,
+    stream: PhotonStream,
+    /// All of them so far or, where they are not kept, those that are still to be drawn.
     photons: Vec<Photon>,
+    /// How many of these have been drawn.
+    drawn: usize,
     /// Which pass it is of those that are as large as passes can be: 0 while they grow.
     repeat: u32,
 }
@@ -102,7 +114,7 @@ struct View {
     shown_emitted: u32,
     /// Passes in that mean.
     repeats: u32,
-    /// Of the pass on its way, where its photons are not kept.
+    /// Of the pass on its way, as far as it is drawn.
     growing: Option<Image>,
 }
 
@@ -173,9 +185,12 @@ impl Progressive {
         if self.kept_emitted > 0 {
             view.shown = self.drawn(&view, &self.kept, self.kept_emitted, 1)?;
         }
+        self.pass.drawn = 0;
         // A pass whose photons are gone begins again.
         if self.pass.options.photons > self.max_photons {
             self.pass.done = 0;
+            self.pass.stream = PhotonStream::default();
+            self.pass.photons = Vec::new();
         }
         self.view = Some(view);
         Ok(())
@@ -260,72 +275,93 @@ impl Progressive {
     }
 
     /// Photons in memory, those of the pass on its way included: at most twice `max_photons`
-    /// times the photons that land for each that is emitted.
+    /// times the photons that land for each that is emitted, and some ten thousand that wait to be
+    /// checked or drawn.
     #[must_use]
     pub fn photons_in_memory(&self) -> usize {
-        self.kept.len() + self.pass.photons.len()
+        self.kept.len() + self.pass.photons.len() + self.pass.stream.waiting()
     }
 
     fn trace_slice(&mut self, slice: u32) -> Result<u32, CausticsError> {
         let total = self.pass.plan.count();
-        let range = self.pass.done..total.min(self.pass.done.saturating_add(slice));
-        let traced = range.len() as u32;
-        let part = trace_part(
+        let traced = slice.min(total - self.pass.done);
+        let part = self.pass.stream.advance(
             &self.world,
             &self.intersector,
             &self.pass.plan,
             &self.pass.options,
-            range,
+            traced,
         )?;
         self.pass.done += traced;
-        let is_kept = self.pass.options.photons <= self.max_photons;
-        if is_kept {
-            self.pass.photons.extend(part.photons);
-        } else if let Some(view) = &mut self.view {
-            let (image, _) = splat(&view.buffer, &part.photons, &self.options.footprint)?;
-            match &mut view.growing {
-                Some(sum) if self.pass.done > traced => add(sum, &image, 1.0),
-                growing => *growing = Some(image),
-            }
-        }
+        self.pass.photons.extend(part.photons);
+        // A slice brings less than that; twice as many soon catch up with a new camera.
+        self.draw(2 * DRAWN, DRAWN)?;
         if self.pass.done >= total {
             self.finish()?;
         }
         Ok(traced)
     }
 
+    /// Draws at most so many of the photons of the pass on its way, if there are at least so many to
+    /// draw.
+    fn draw(&mut self, most: usize, least: usize) -> Result<(), CausticsError> {
+        let pass = &mut self.pass;
+        if self.options.estimate != Estimate::Nearest
+            && let Some(view) = &mut self.view
+        {
+            let end = pass.photons.len().min(pass.drawn.saturating_add(most));
+            while end - pass.drawn >= least.max(1) {
+                let batch = pass.drawn..end.min(pass.drawn + DRAWN);
+                pass.drawn = batch.end;
+                let photons = &pass.photons[batch];
+                let (image, _) = splat(&view.buffer, photons, &self.options.footprint)?;
+                match &mut view.growing {
+                    Some(sum) => add(sum, &image, 1.0),
+                    growing => *growing = Some(image),
+                }
+            }
+        } else {
+            pass.drawn = pass.photons.len();
+        }
+        if pass.options.photons > self.max_photons {
+            pass.photons.drain(..pass.drawn);
+            pass.drawn = 0;
+        }
+        Ok(())
+    }
+
     /// Shows the pass that is whole now, and begins the next.
     fn finish(&mut self) -> Result<(), CausticsError> {
+        self.draw(usize::MAX, 1)?;
         let photons = self.pass.options.photons;
-        let is_kept = photons <= self.max_photons;
-        if is_kept {
+        if photons <= self.max_photons {
             self.kept = std::mem::take(&mut self.pass.photons);
             self.kept_emitted = photons;
         }
         if let Some(mut view) = self.view.take() {
-            let image = match view.growing.take() {
-                Some(image) if !is_kept => Some(image),
-                _ if is_kept => {
+            let image = match (self.options.estimate, view.growing.take()) {
+                (Estimate::Nearest, _) => {
                     let passes = self.pass.repeat + 1;
-                    Some(self.drawn(&view, &self.kept, photons, passes)?)
+                    self.drawn(&view, &self.kept, photons, passes)?
                 }
-                _ => None,
+                (_, Some(image)) => image,
+                // Nothing landed.
+                (_, None) => Image::new(view.options.width, view.options.height)
+                    .map_err(caustics_render::RenderError::from)?,
             };
-            if let Some(image) = image {
-                if self.pass.repeat == 0 {
-                    view.shown = image;
-                    view.repeats = 1;
-                } else {
-                    // The mean of this and those before.
-                    view.repeats += 1;
-                    let part = 1.0 / view.repeats as f32;
-                    for pixel in view.shown.pixels_mut() {
-                        *pixel = pixel.map(|it| (1.0 - part) * it);
-                    }
-                    add(&mut view.shown, &image, part);
+            if self.pass.repeat == 0 {
+                view.shown = image;
+                view.repeats = 1;
+            } else {
+                // The mean of this and those before.
+                view.repeats += 1;
+                let part = 1.0 / view.repeats as f32;
+                for pixel in view.shown.pixels_mut() {
+                    *pixel = pixel.map(|it| (1.0 - part) * it);
                 }
-                view.shown_emitted = photons.saturating_mul(view.repeats);
+                add(&mut view.shown, &image, part);
             }
+            view.shown_emitted = photons.saturating_mul(view.repeats);
             self.view = Some(view);
         }
         self.pass = self.next_pass()?;
@@ -392,8 +428,6 @@ impl Pass {
         options: &CausticsOptions,
     ) -> Result<Self, CausticsError> {
         let options = TraceOptions {
-            // A slice of a pass does not know the neighbours of its last photons.
-            check_footprints: false,
             photons: FIRST_PASS,
             ..options.trace
         };
@@ -410,7 +444,9 @@ impl Pass {
             plan: EmissionPlan::new(world, intersector, &options)?,
             options,
             done: 0,
+            stream: PhotonStream::default(),
             photons: Vec::new(),
+            drawn: 0,
             repeat,
         })
     }

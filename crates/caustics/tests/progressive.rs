@@ -51,7 +51,6 @@ const SIZE: PictureOptions = PictureOptions {
 fn single(scene: &Scene, photons: u32) -> Image {
     let mut options = CausticsOptions::default();
     options.trace.photons = photons;
-    options.trace.check_footprints = false;
     let caustics = Caustics::new(scene, &options).expect("valid");
     caustics.render(&camera(), &SIZE).expect("valid").caustics
 }

@@ -1,16 +1,20 @@
 //! Measures how photons are emitted: what aiming saves, what flickers, what weak lights get, how
-//! progressive pictures converge. Writes `docs/emission.md`.
+//! progressive pictures converge, what culling saves and costs. Writes `docs/emission.md`.
 //!
 //! ```text
 //! cargo run --release -p caustics-benches --bin emission [section ...]
 //! ```
 //!
-//! Sections are `aim`, `frames`, `share`, `progressive` and `area`; those that are not named stay as
+//! Sections are `aim`, `frames`, `share`, `progressive`, `area`, `cull` and
+//! `compact`; those that are not named stay as
 //! they are. All take some minutes. Every number but the seconds is the same on any machine.
 
 mod aim;
 mod area;
+mod chart;
+mod compact;
 mod converge;
+mod cull;
 mod frames;
 mod share;
 mod view;
@@ -31,12 +35,14 @@ seconds are of two threads of a shared one, so compare them only within a table.
 
 type Section = fn() -> Result<String, Failure>;
 
-const SECTIONS: [(&str, Section); 5] = [
+const SECTIONS: [(&str, Section); 7] = [
     ("aim", aim::section),
     ("frames", frames::section),
     ("share", share::section),
     ("progressive", converge::section),
     ("area", area::section),
+    ("cull", cull::section),
+    ("compact", compact::section),
 ];
 
 fn main() -> Result<(), Failure> {

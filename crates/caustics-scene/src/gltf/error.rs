@@ -2,7 +2,7 @@
 
 use super::element::{Element, ElementKind};
 use crate::camera::CameraError;
-use crate::light::LightError;
+use crate::light_check::LightError;
 use crate::material::MaterialError;
 use crate::scene::SceneError;
 use caustics_geometry::MeshError;
