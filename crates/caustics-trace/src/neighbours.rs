@@ -137,17 +137,21 @@ pub(crate) fn checked(photon: &Photon, landed: &[[Option<&Photon>; 2]; 2]) -> Ch
 /// from the ray that just misses it, as c sqrt(x). With the cells' width as the unit, x is found
 /// from the ratio r of the photon's differential, c / (2 sqrt(x)), to the distance of its neighbour,
 /// c (sqrt(x + 1) - sqrt(x)): it is 1 / (4 r (r - 1)). The cell reaches from x - 1/2, or from the
-/// silhouette, to x + 1/2, and the mean and the variance of where its light lands follow.
+/// silhouette, to x + 1/2, and the mean and the variance of where its light lands follow. With s and
+/// d for the sum and the difference of the roots of the cell's ends, the mean is s / 2 + d² / (6 s)
+/// and the variance d² / 12 (1 - d² / (3 s²)), in which nothing cancels.
 fn silhouette(ratio: f32) -> (f32, f32) {
     let x = 1.0 / (4.0 * ratio * (ratio - 1.0));
     let (low, high) = ((x - 0.5).max(0.0), x + 0.5);
     // In c.
-    let mean = 2.0 / 3.0 * (high.powf(1.5) - low.powf(1.5)) / (high - low);
-    let variance = (0.5 * (low + high) - mean * mean).max(0.0);
+    let sum = low.sqrt() + high.sqrt();
+    let difference = (high - low) / sum;
+    let mean = 0.5 * sum + difference * difference / (6.0 * sum);
+    let skew = difference / sum;
+    // As wide as the even light that has this variance.
+    let width = difference * (1.0 - skew * skew / 3.0).sqrt();
     // c in the distance to the neighbour.
     let scale = 2.0 * ratio * x.sqrt();
-    // As wide as the even light that has this variance.
-    let width = (12.0 * variance).sqrt();
     (scale * (mean - x.sqrt()), SILHOUETTE_EXTENT * scale * width)
 }
 

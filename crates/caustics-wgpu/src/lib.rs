@@ -100,9 +100,12 @@
 //! Triangles stay watertight on all of them; products whose rounding matters are hidden from the
 //! optimiser, and exact spheres are met in pairs of floats.
 //!
-//! Records are appended in any order. Those of one photon keep theirs, so that a stable sort by
-//! [`FootprintRecord::photon`], or the [links](PhotonBuffers::links) between them, give the same
-//! order in every run. Sums of energy are integers and do not depend on it.
+//! Photons land in any order; then their records are put in that of the photons, by a prefix sum over
+//! how many each has. On the way, each footprint of a lattice is checked against where the photons
+//! beside it landed on the same path, as
+//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says: so the records are
+//! those of the CPU's photons, in their order, the same bits in every run. Sums of energy are
+//! integers and do not depend on any order.
 //!
 //! # How a splat is made
 //!
@@ -143,6 +146,7 @@ mod gpu_scene;
 mod pass_layout;
 mod pass_times;
 mod photon_buffers;
+mod photon_order;
 mod photon_tracer;
 mod prefix_sum;
 mod recorder;

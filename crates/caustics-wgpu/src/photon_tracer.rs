@@ -4,6 +4,7 @@ use crate::GpuError;
 use crate::error_scope::filled_buffer;
 use crate::pass_layout::{PassLayout, Slot};
 use crate::photon_buffers::PhotonBuffers;
+use crate::photon_order::{PhotonOrder, dispatch};
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
 use crate::scene_buffers::{SceneBuffers, fits};
@@ -14,7 +15,7 @@ use crate::trace_plan::{PlannedEmitter, TracePlan};
 /// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
 const WORKGROUP_SIZE: u32 = 64;
 
-const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 31] {
+const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 34] {
     [
         parameters,
         FOOTPRINT_RECORD,
@@ -28,6 +29,8 @@ const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 31] {
         shader_piece!("wide_integer"),
         shader_piece!("sobol"),
         shader_piece!("halton"),
+        shader_piece!("grid"),
+        shader_piece!("lattice"),
         shader_piece!("point_set"),
         shader_piece!("warp"),
         shader_piece!("warp_inverse"),
@@ -45,6 +48,7 @@ const fn pieces(parameters: ShaderPiece) -> [ShaderPiece; 31] {
         shader_piece!("area_emission"),
         shader_piece!("overlap"),
         shader_piece!("ledger"),
+        shader_piece!("photon_links"),
         shader_piece!("photon_store"),
         shader_piece!("tracer"),
     ]
@@ -76,7 +80,7 @@ const SLOTS: [Slot; 9] = [
 ];
 
 /// Traces photons on the GPU: emission, flight and landing in one dispatch, one photon to an
-/// invocation.
+/// invocation; then their records are put in order, and their footprints checked.
 ///
 /// It binds eight storage buffers, as many as WebGPU's default limits allow.
 #[derive(Clone, Debug)]
@@ -84,6 +88,7 @@ pub struct PhotonTracer {
     layout: PassLayout,
     /// For rays of 2 and of 4 parameters.
     pipelines: [wgpu::ComputePipeline; 2],
+    order: PhotonOrder,
 }
 
 impl PhotonTracer {
@@ -93,14 +98,20 @@ impl PhotonTracer {
         let layout = PassLayout::new(device, "photon tracer", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let pipelines = [SHADER_2, SHADER_4]
             .map(|shader| layout.compute(device, &shader, "trace_photons", &[]));
-        Self { layout, pipelines }
+        let order = PhotonOrder::new(device);
+        Self {
+            layout,
+            pipelines,
+            order,
+        }
     }
 
-    /// Records the tracing of a range of the plan's photons, whose records are appended to the
-    /// buffers.
+    /// Records the tracing of a range of the plan's photons, whose records fill the buffers.
     ///
     /// Before the first batch of a frame call [`PhotonBuffers::clear`]; before every other,
-    /// [`PhotonBuffers::forget_records`].
+    /// [`PhotonBuffers::forget_records`]. With
+    /// [`TraceOptions::check_footprints`](caustics_trace::TraceOptions::check_footprints), photons
+    /// beside the range are traced again with it, so that batches have the footprints of one run.
     ///
     /// # Errors
     /// [`GpuError::PhotonRange`], as [`RendererError::Gpu`]; [`RendererError::DeviceLost`].
@@ -135,8 +146,19 @@ impl PhotonTracer {
                 batch: into.photons(),
             }));
         }
+        let scratch = &into.scratch;
+        let wider = plan.with_neighbours(&photons);
+        let slots = wider.len() as u32;
+        if slots > scratch.slots {
+            return Err(RendererError::Gpu(GpuError::PhotonRange {
+                first: wider.start,
+                end: wider.end,
+                photons: plan.photons(),
+                batch: scratch.slots,
+            }));
+        }
         // A photon that no dispatch is for has no records.
-        recorder.encoder.clear_buffer(&into.links, 0, None);
+        recorder.encoder.clear_buffer(&scratch.links, 0, None);
         fits(device, "lists of emitters", 4 * plan.lists.len() as u64)?;
         let lists = filled_buffer(
             device,
@@ -144,78 +166,94 @@ impl PhotonTracer {
             wgpu::BufferUsages::STORAGE,
             bytemuck::cast_slice(&plan.lists),
         )?;
+        // The batch's own photons first: if there is no room for all, neighbours go without.
+        let ranges = [
+            photons.clone(),
+            wider.start..photons.start,
+            photons.end..wider.end,
+        ];
         let mut dispatches = Vec::new();
-        for dispatch in dispatches_of(&plan.emitters, &photons) {
-            let params = self.params(scene, plan, &photons, &dispatch, into);
-            let uniform = filled_buffer(
-                device,
-                "trace params",
-                wgpu::BufferUsages::UNIFORM,
-                bytemuck::bytes_of(&params),
-            )?;
-            let resources = [
-                &uniform,
-                &scene.nodes,
-                &scene.vertices,
-                &scene.triangles,
-                &scene.bodies,
-                &lists,
-                &into.records,
-                &into.counters,
-                &into.links,
-            ]
-            .map(wgpu::Buffer::as_entire_binding);
-            let group = self.layout.bind(device, &resources);
-            dispatches.push((usize::from(dispatch.dimensions > 2), group, params.count));
+        for (number, range) in ranges.iter().enumerate() {
+            for part in dispatches_of(&plan.emitters, range) {
+                let mut params = params(scene, plan, &part, into);
+                params.batch_first = photons.start;
+                params.slots = slots;
+                if number > 0 {
+                    params.flags |= TraceParams::NEIGHBOURS_ONLY;
+                }
+                let uniform = filled_buffer(
+                    device,
+                    "trace params",
+                    wgpu::BufferUsages::UNIFORM,
+                    bytemuck::bytes_of(&params),
+                )?;
+                let resources = [
+                    &uniform,
+                    &scene.nodes,
+                    &scene.vertices,
+                    &scene.triangles,
+                    &scene.bodies,
+                    &lists,
+                    &scratch.appended,
+                    &into.counters,
+                    &scratch.links,
+                ]
+                .map(wgpu::Buffer::as_entire_binding);
+                let group = self.layout.bind(device, &resources);
+                dispatches.push((part, uniform, group, number == 0));
+            }
         }
         let mut pass = recorder.compute("trace", dispatches.len() as u32);
-        for (pipeline, group, count) in &dispatches {
-            pass.set_pipeline(&self.pipelines[*pipeline]);
+        for (part, _, group, _) in &dispatches {
+            pass.set_pipeline(&self.pipelines[usize::from(part.dimensions > 2)]);
             pass.set_bind_group(0, group, &[]);
-            let groups = count.div_ceil(WORKGROUP_SIZE);
-            pass.dispatch_workgroups(groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1);
+            dispatch(&mut pass, part.photons.len() as u32, WORKGROUP_SIZE);
         }
-        Ok(())
-    }
-
-    fn params(
-        &self,
-        scene: &SceneBuffers,
-        plan: &TracePlan,
-        batch: &Range<u32>,
-        dispatch: &Dispatch,
-        into: &PhotonBuffers,
-    ) -> TraceParams {
-        let mut params = TraceParams {
-            zero: 0,
-            first: dispatch.photons.start,
-            count: dispatch.photons.len() as u32,
-            batch_first: batch.start,
-            emitter_count: dispatch.emitters.len() as u32,
-            sequence: plan.sequence(),
-            seed_low: plan.options.seed as u32,
-            seed_high: (plan.options.seed >> 32) as u32,
-            max_depth: plan.options.max_depth,
-            branching: plan.branching(),
-            min_weight: plan.options.min_weight,
-            flux_scale: plan.flux_scale,
-            first_link: into.photons(),
-            root: scene.root,
-            unused_a: 0,
-            unused_b: 0,
-            emitters: [crate::trace_params::Emitter::default(); MAX_EMITTERS],
-        };
-        let emitters = &plan.emitters[dispatch.emitters.clone()];
-        for (slot, emitter) in params.emitters.iter_mut().zip(emitters) {
-            *slot = emitter.mirror;
-            slot.first_of_light -= dispatch.emitters.start as u32;
-        }
-        params
+        drop(pass);
+        let own = dispatches.iter().filter(|(.., is_own)| *is_own);
+        let parts: Vec<_> = own
+            .map(|(part, uniform, ..)| (uniform, part.photons.len() as u32))
+            .collect();
+        let count = photons.len() as u32;
+        self.order
+            .record(device, recorder, count, &parts, &lists, into)
     }
 }
 
-/// Workgroups of a dispatch along its first axis.
-const MAX_GROUPS: u32 = 32_768;
+/// What a dispatch is told, but for what it has in common with the others of its batch.
+fn params(
+    scene: &SceneBuffers,
+    plan: &TracePlan,
+    part: &Dispatch,
+    into: &PhotonBuffers,
+) -> TraceParams {
+    let checks = plan.checks_footprints(part.dimensions);
+    let mut params = TraceParams {
+        zero: 0,
+        first: part.photons.start,
+        count: part.photons.len() as u32,
+        batch_first: 0,
+        emitter_count: part.emitters.len() as u32,
+        sequence: plan.sequence(),
+        seed_low: plan.options.seed as u32,
+        seed_high: (plan.options.seed >> 32) as u32,
+        max_depth: plan.options.max_depth,
+        branching: plan.branching(),
+        min_weight: plan.options.min_weight,
+        flux_scale: plan.flux_scale,
+        first_link: into.scratch.slots,
+        root: scene.root,
+        flags: if checks { TraceParams::CHECKS } else { 0 },
+        slots: 0,
+        emitters: [crate::trace_params::Emitter::default(); MAX_EMITTERS],
+    };
+    let emitters = &plan.emitters[part.emitters.clone()];
+    for (slot, emitter) in params.emitters.iter_mut().zip(emitters) {
+        *slot = emitter.mirror;
+        slot.first_of_light -= part.emitters.start as u32;
+    }
+    params
+}
 
 /// Consecutive photons of emitters that are all of one kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,6 +336,10 @@ mod tests {
             assert_eq!(constant("SURFACE_CAP"), Emitter::SURFACE_CAP);
             assert_eq!(constant("NO_CASTER"), NO_CASTER);
             assert_eq!(constant("NO_MAP"), Emitter::NO_MAP);
+            assert_eq!(
+                constant("FLAG_NEIGHBOURS_ONLY"),
+                TraceParams::NEIGHBOURS_ONLY
+            );
             assert_eq!(constant("MAP_RESOLUTION"), ProjectionMap::RESOLUTION);
         }
     }
@@ -402,8 +444,8 @@ mod tests {
                 flux_scale,
                 first_link,
                 root,
-                unused_a,
-                unused_b,
+                flags,
+                slots,
                 emitters,
             }
         );
@@ -418,6 +460,7 @@ mod tests {
             ("COUNTER_RAYS", TraceCounters::RAYS),
             ("COUNTER_FALLBACKS", TraceCounters::FALLBACKS),
             ("COUNTER_BOUNDED", TraceCounters::BOUNDED),
+            ("COUNTER_REPLACED", TraceCounters::REPLACED),
             ("COUNTER_SUMS", TraceCounters::SUMS),
             ("FATE_CROWDED", TraceCounters::CROWDED),
             ("LINE_EMITTED", TraceCounters::EMITTED),

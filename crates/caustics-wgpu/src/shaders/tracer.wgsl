@@ -24,6 +24,8 @@ struct Branch {
     channel: u32,
     // A hash of what the path met and did there.
     path: u32,
+    // Whether its footprint was widened for paths that ended where it went on.
+    is_thinned: bool,
 }
 
 var<private> pending: array<Branch, MAX_PENDING>;
@@ -58,7 +60,7 @@ fn receive(branch: Branch, point: SurfacePoint) {
         side * point.geometric_normal,
         photon_number,
     );
-    let has_room = store_photon(record, branch.path);
+    let has_room = store_photon(record, branch.path, branch.is_thinned);
     book(select(FATE_CROWDED, FATE_STORED, has_room), branch.flux);
 }
 
@@ -129,6 +131,7 @@ fn follow(
         branch.has_split,
         branch.channel,
         extended(branch.path, object, 1u + outgoing.event),
+        branch.is_thinned || kept < 1.0,
     );
     pending_count += 1u;
 }
@@ -223,11 +226,7 @@ fn advance(branch_given: Branch) {
 }
 
 fn trace_photon(number: u32) {
-    // The emitter whose photons these are: the last that does not begin after it.
-    var emitter = 0u;
-    while emitter + 1u < trace.emitter_count && trace.emitters[emitter + 1u].first <= number {
-        emitter += 1u;
-    }
+    let emitter = emitter_of(number);
     photon_number = number;
     photon_emitter = emitter;
     last_record = 0u;
@@ -248,6 +247,7 @@ fn trace_photon(number: u32) {
             false,
             ALL_CHANNELS,
             0u,
+            false,
         );
         pending_count = 1u;
     }
@@ -255,7 +255,7 @@ fn trace_photon(number: u32) {
         pending_count -= 1u;
         advance(pending[pending_count]);
     }
-    links[number - trace.batch_first] = last_record;
+    links[slot_of(number)] = last_record;
 }
 
 const WORKGROUP_SIZE: u32 = 64u;
