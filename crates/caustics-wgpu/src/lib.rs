@@ -82,7 +82,7 @@
 //! | say where light comes from | [`FrameLight`]; [`SceneBuffers`] and [`TracePlan`], or [`FootprintBatch`]es |
 //! | choose how footprints become pixels | [`SplatOptions`], [`SplatMethod`], [`SplatKernel`] |
 //! | know the light at any point, in a shader of one's own or from a buffer | [`Gather`] |
-//! | trace photons alone | [`PhotonTracer`], [`PhotonBuffers`], [`TraceCounters`] |
+//! | trace photons alone | [`PhotonTracer`], [`Hierarchy`], [`PhotonBuffers`], [`TraceCounters`] |
 //! | let the scene move without building it anew | [`SceneRefit`] |
 //! | keep a photon where both sides can read it | [`FootprintRecord`] |
 //! | know what became of footprints, and how long passes took | [`PreparedFrame`], [`SplatStats`], [`PassTime`] |
@@ -121,7 +121,9 @@
 //! # Limits
 //!
 //! The tracer takes no refined lattices, numbers at most 2¹⁶ dielectrics, and binds each kind of
-//! data whole: two million triangles in 128 MiB. 28 branches of a photon may wait; beyond 24 it goes
+//! data whole: two million triangles in 128 MiB. Where there is no room for all records of a batch,
+//! which of them are lost is another matter in every run; batches that are smaller than all photons
+//! trace a row of the lattice on either side again, for the check of footprints. 28 branches of a photon may wait; beyond 24 it goes
 //! one way at each surface. They take 3 to 5 KB of an invocation's memory. A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one
 //! batch fit one binding, 1.6 million in 128 MiB; more are several batches. A view takes about 70
 //! bytes a pixel, in half floats and eight layers 200. On a browser's device, errors arrive after the
@@ -168,6 +170,7 @@ mod trace_counters;
 mod trace_params;
 mod trace_plan;
 mod view_params;
+mod wide_hierarchy;
 
 pub use camera_matrix::camera_matrix;
 pub use capabilities::Capabilities;
@@ -178,7 +181,7 @@ pub use gather::{Gather, GatherCounts, GatherOptions, GatherPoint};
 pub use glam;
 pub use pass_times::{FrameTimestamps, PassTime};
 pub use photon_buffers::PhotonBuffers;
-pub use photon_tracer::PhotonTracer;
+pub use photon_tracer::{Hierarchy, PhotonTracer};
 pub use recorder::RecordedWork;
 pub use renderer::{CausticsRenderer, FrameLight, FrameParams, PreparedFrame, RendererOptions};
 pub use renderer_error::{MissingLimit, RendererError};

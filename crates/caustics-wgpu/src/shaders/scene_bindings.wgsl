@@ -1,6 +1,5 @@
 // Where the tracer finds the scene. Twin: `SceneBuffers` in scene_buffers.rs.
 
-@group(0) @binding(1) var<storage, read> nodes: array<Node>;
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> triangles: array<Triangle>;
 @group(0) @binding(4) var<storage, read> bodies: array<Body>;
