@@ -102,7 +102,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = [env!("CARGO_MANIFEST_DIR"), "../docs/gpu.md"];
         let path: PathBuf = path.iter().collect();
         let document = std::fs::read_to_string(&path)?;
-        std::fs::write(&path, with_tables(&document, &[("trace", section)])?)?;
+        std::fs::write(
+            &path,
+            with_tables(&document, &[("trace", section)]).map_err(|it| it.to_string())?,
+        )?;
     }
     Ok(())
 }
