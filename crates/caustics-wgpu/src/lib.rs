@@ -133,7 +133,7 @@
 //!
 //! Woop, Benthin, Wald 2013 and Haines, Günther, Akenine-Möller 2019 for hits, Jarzynski, Olano 2020
 //! for random numbers, Dekker 1971 for pairs of floats, Meister, Bittner 2018 (by obvhs) for the
-//! hierarchy; Igehy 1999 for footprints; Yang and Ouyang 2021 for splats of ellipses; Duff et al. 2017 for
+//! hierarchy, whose nodes are quantised after Ylitie, Karras, Laine 2017; Igehy 1999 for footprints; Yang and Ouyang 2021 for splats of ellipses; Duff et al. 2017 for
 //! frames. The rest is this workspace's own, and is derived where it stands.
 
 mod body_order;
