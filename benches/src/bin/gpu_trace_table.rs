@@ -1,25 +1,30 @@
-//! Photons per second of the GPU's tracer beside the CPU's, on the scenes of the tests.
+//! Tracing by the GPU beside tracing by the CPU, on the scenes of the tests, turn by turn.
 //!
-//! Runs on the adapter that wgpu prefers: a real GPU where there is one, else a software one. Takes
-//! the number of photons as its argument (100,000 if none is given). Before anything is timed, the
-//! two tracers have to store the same numbers of photons, but for one in a thousand.
+//! `cargo run --release -p caustics-benches --bin gpu_trace_table -- [photons] [scene ...]`
 //!
-//! Prints a Markdown table: photons a second on both sides, their ratio, and what a frame asks of the
-//! GPU. Bytes are those of the buffers, each counted once; a dispatch writes its records and reads
-//! the scene through caches.
+//! Runs on the adapter that wgpu prefers: a real GPU where there is one, else a software one. With
+//! 20,000 photons a scene if no number is given, on all scenes if none is named. Before anything is
+//! timed, what landed is compared record by record; the numbers of records may differ by one in a
+//! thousand.
+//!
+//! Writes its tables into the section `trace` of `docs/gpu.md`, if all scenes were measured, and
+//! prints them. Bytes are those of the buffers, each counted once; a dispatch writes its records and
+//! reads the scene through caches.
 
 use std::error::Error;
+use std::path::PathBuf;
 
-use caustics_benches::timing::{Patience, median_of};
+use caustics_benches::conditions::conditions;
+use caustics_benches::document::with_tables;
 use caustics_scene::gltf::load_path;
 use caustics_scene::{BvhOptions, World};
-use caustics_trace::{EmissionPlan, Fate, TraceOptions, trace_plan};
-use caustics_wgpu::{PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, TracePlan};
-
-const PATIENCE: Patience = Patience {
-    runs: 7,
-    seconds: 4.0,
+use caustics_trace::{EmissionPlan, Photon, PhotonMap, TraceOptions, trace_plan};
+use caustics_wgpu::glam::Vec3;
+use caustics_wgpu::{
+    FootprintRecord, Hierarchy, PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, TracePlan,
 };
+
+const ROUNDS: usize = 5;
 
 const SCENES: [&str; 10] = [
     "p01_sphere",
@@ -37,30 +42,71 @@ const SCENES: [&str; 10] = [
 struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    tracer: PhotonTracer,
+    /// One for each [`Hierarchy`].
+    tracers: [PhotonTracer; 2],
+}
+
+/// What is measured of a scene.
+struct Row {
+    name: &'static str,
+    photons: u32,
+    rays: u64,
+    parity: Parity,
+    replaced: u64,
+    dispatches: u32,
+    scene_bytes: u64,
+    batch_bytes: u64,
+    /// Seconds, medians.
+    cpu: f64,
+    gpu: [f64; 2],
+}
+
+/// How far the two sides are apart.
+#[derive(Default)]
+struct Parity {
+    records: usize,
+    /// Records of which every bit is the same.
+    equal: usize,
+    /// The largest distance between landing points, relative to the size of the scene.
+    position: f32,
+    /// The largest relative difference of a flux.
+    flux: f32,
+    /// The largest difference of a footprint's axis, relative to the longer one.
+    axes: f32,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let photons = std::env::args()
-        .nth(1)
-        .map_or(Ok(100_000), |it| it.parse())?;
+    let mut arguments = std::env::args().skip(1);
+    let photons = arguments.next().map_or(Ok(20_000), |it| it.parse())?;
+    let asked: Vec<String> = arguments.collect();
     let (gpu, name) = pollster::block_on(open())?;
-    println!(
-        "{photons} photons; {name}; CPU: {} threads",
-        rayon::current_num_threads()
-    );
-    println!();
-    println!(
-        "| scene | records | CPU, 10⁶/s | GPU, 10⁶/s | GPU / CPU | dispatches | scene, MB | records, MB |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
-    let mut ratios = Vec::new();
+    let mut rows = Vec::new();
     for scene in SCENES {
-        ratios.push(row(&gpu, scene, photons)?);
+        if asked.is_empty() || asked.iter().any(|it| it == scene) {
+            eprintln!("{scene}");
+            rows.push(measured(&gpu, scene, photons)?);
+        }
     }
-    let mean = ratios.iter().map(|it: &f64| it.ln()).sum::<f64>() / ratios.len() as f64;
-    println!();
-    println!("geometric mean of GPU / CPU: {:.2}", mean.exp());
+    let now = conditions(&name);
+    let section = format!(
+        "{photons} photons a scene, medians of {ROUNDS} runs of each in turn: {}, beside {} threads \
+         of the CPU; {}, commit {}.\n\n{}",
+        now.machine,
+        now.threads,
+        now.date,
+        now.commit,
+        tables(&rows)
+    );
+    println!("{section}");
+    if rows.len() == SCENES.len() {
+        let path = [env!("CARGO_MANIFEST_DIR"), "../docs/gpu.md"];
+        let path: PathBuf = path.iter().collect();
+        let document = std::fs::read_to_string(&path)?;
+        std::fs::write(
+            &path,
+            with_tables(&document, &[("trace", section)]).map_err(|it| it.to_string())?,
+        )?;
+    }
     Ok(())
 }
 
@@ -76,17 +122,16 @@ async fn open() -> Result<(Gpu, String), Box<dyn Error>> {
     let (device, queue) = adapter
         .request_device(&wgpu::DeviceDescriptor::default())
         .await?;
-    let tracer = PhotonTracer::new(&device);
+    let tracers = Hierarchy::ALL.map(|it| PhotonTracer::with_hierarchy(&device, it));
     let gpu = Gpu {
         device,
         queue,
-        tracer,
+        tracers,
     };
     Ok((gpu, format!("{} ({:?})", info.name, info.backend)))
 }
 
-/// Measures a scene, prints its row, and returns the ratio.
-fn row(gpu: &Gpu, name: &str, photons: u32) -> Result<f64, Box<dyn Error>> {
+fn measured(gpu: &Gpu, name: &'static str, photons: u32) -> Result<Row, Box<dyn Error>> {
     let path = format!("{}/../tests/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
     let world = World::new(&load_path(path)?.scene)?;
     let rays = world.intersector(&BvhOptions::default())?;
@@ -101,41 +146,153 @@ fn row(gpu: &Gpu, name: &str, photons: u32) -> Result<f64, Box<dyn Error>> {
     let buffers = PhotonBuffers::new(&gpu.device, photons, capacity.min(1_600_000) as u32)?;
 
     let by_cpu = || trace_plan(&world, &rays, &emission, &options, &|_| {});
-    let mut dispatches = 0;
-    let mut on_gpu = || -> Result<(), Box<dyn Error>> {
+    let on_gpu = |tracer: &PhotonTracer| -> Result<u32, Box<dyn Error>> {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         buffers.clear(&mut encoder);
         let all = 0..plan.photons();
-        let work = gpu
-            .tracer
-            .trace(&gpu.device, &mut encoder, &scene, &plan, all, &buffers)?;
-        dispatches = work.dispatches;
+        let work = tracer.trace(&gpu.device, &mut encoder, &scene, &plan, all, &buffers)?;
         gpu.queue.submit([encoder.finish()]);
         gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-        Ok(())
+        Ok(work.dispatches)
     };
+    let expected = by_cpu()?;
+    let mut dispatches = 0;
+    let mut parity = Parity::default();
+    let mut replaced = 0;
     // The first run also compiles the shader on some adapters.
-    on_gpu()?;
-    let counters = TraceCounters::new(&read(gpu, buffers.counters())?, &plan)?;
-    let expected = by_cpu()?.ledger.entry(Fate::Stored).count;
-    let stored = u64::from(counters.stored);
-    if 1000 * stored.abs_diff(expected) > u64::from(photons) {
-        return Err(format!("{name}: {stored} records, but {expected} on the CPU").into());
+    for tracer in &gpu.tracers {
+        dispatches = on_gpu(tracer)?;
+        let counters = TraceCounters::new(&read(gpu, buffers.counters())?, &plan)?;
+        let records = read(gpu, buffers.records())?;
+        let records: &[FootprintRecord] = bytemuck::cast_slice(&records);
+        let stored = &records[..counters.stored as usize];
+        replaced = counters.ledger.replaced_differentials;
+        parity = compared(&world, &expected, stored).map_err(|it| format!("{name}: {it}"))?;
     }
-    let cpu = median_of(PATIENCE, by_cpu)?.seconds;
-    let gpu_seconds = median_of(PATIENCE, on_gpu)?.seconds;
-    let speed = |seconds: f64| f64::from(plan.photons()) / seconds / 1e6;
-    let ratio = cpu / gpu_seconds;
-    println!(
-        "| {name} | {stored} | {:.3} | {:.3} | {ratio:.2} | {dispatches} | {:.1} | {:.1} |",
-        speed(cpu),
-        speed(gpu_seconds),
-        scene.bytes() as f64 / 1e6,
-        (stored * 88) as f64 / 1e6,
+    let mut seconds = [const { Vec::new() }; 3];
+    for _ in 0..ROUNDS {
+        seconds[0].push(timed(|| by_cpu().map_err(Box::from))?);
+        for (seconds, tracer) in seconds[1..].iter_mut().zip(&gpu.tracers) {
+            seconds.push(timed(|| on_gpu(tracer))?);
+        }
+    }
+    let [cpu, binary, wide] = seconds.map(|mut all| {
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    });
+    Ok(Row {
+        name,
+        photons: plan.photons(),
+        rays: expected.ledger.rays,
+        parity,
+        replaced,
+        dispatches,
+        scene_bytes: scene.bytes(),
+        batch_bytes: buffers.bytes(),
+        cpu,
+        gpu: [binary, wide],
+    })
+}
+
+fn timed<T>(run: impl FnOnce() -> Result<T, Box<dyn Error>>) -> Result<f64, Box<dyn Error>> {
+    let start = std::time::Instant::now();
+    run()?;
+    Ok(start.elapsed().as_secs_f64())
+}
+
+/// Photons and records are in the same order. Where one is missing, those after it are compared with
+/// others, so that all differ.
+fn compared(
+    world: &World,
+    expected: &PhotonMap,
+    found: &[FootprintRecord],
+) -> Result<Parity, String> {
+    let photons = &expected.photons;
+    if 1000 * photons.len().abs_diff(found.len()) > photons.len() {
+        return Err(format!(
+            "{} records, but {} on the CPU",
+            found.len(),
+            photons.len()
+        ));
+    }
+    let size = world.bounds().diagonal().length();
+    let mut parity = Parity {
+        records: found.len(),
+        ..Parity::default()
+    };
+    for (photon, record) in photons.iter().zip(found) {
+        let photon: &Photon = photon;
+        let same = FootprintRecord::numbered(photon, record.photon);
+        parity.equal += usize::from(same == *record);
+        let distance = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).distance(b.into());
+        let longer = photon.axes[0].length().max(photon.axes[1].length());
+        let axes = distance(record.axis_u, same.axis_u).max(distance(record.axis_v, same.axis_v));
+        if axes > 0.0 {
+            parity.axes = parity.axes.max(axes / longer);
+        }
+        let position = distance(record.position, same.position) / size;
+        parity.position = parity.position.max(position);
+        let flux = (record.flux() - photon.flux).abs().max_element();
+        parity.flux = parity.flux.max(flux / photon.flux.max_element());
+    }
+    Ok(parity)
+}
+
+/// As Markdown.
+fn tables(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| scene | 10⁶ rays | CPU, 10⁶ rays/s | GPU, 10⁶ rays/s | 10³ photons/s | GPU / CPU | wide / binary hierarchy |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
     );
-    Ok(ratio)
+    for row in rows {
+        let rays = row.rays as f64 / 1e6;
+        let [binary, wide] = row.gpu;
+        text += &format!(
+            "| {} | {rays:.2} | {:.2} | {:.2} | {:.0} | {:.2} | {:.2} |\n",
+            row.name,
+            rays / row.cpu,
+            rays / wide,
+            f64::from(row.photons) / wide / 1e3,
+            row.cpu / wide,
+            binary / wide,
+        );
+    }
+    let mean = |ratio: fn(&Row) -> f64| {
+        let sum: f64 = rows.iter().map(|row| ratio(row).ln()).sum();
+        (sum / rows.len().max(1) as f64).exp()
+    };
+    text += &format!(
+        "| geometric mean | | | | | {:.2} | {:.2} |\n\n",
+        mean(|row| row.cpu / row.gpu[1]),
+        mean(|row| row.gpu[0] / row.gpu[1]),
+    );
+    text += "| scene | records | equal in every bit | position | flux | axes | from neighbours | dispatches | scene, MB | batch, MB |\n\
+             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+    for row in rows {
+        let parity = &row.parity;
+        text += &format!(
+            "| {} | {} | {} | {:.0e} | {:.0e} | {:.0e} | {} | {} | {:.1} | {:.1} |\n",
+            row.name,
+            parity.records,
+            parity.equal,
+            parity.position,
+            parity.flux,
+            parity.axes,
+            row.replaced,
+            row.dispatches,
+            row.scene_bytes as f64 / 1e6,
+            row.batch_bytes as f64 / 1e6,
+        );
+    }
+    text += "\n*wide / binary* is the speed of the wide hierarchy over that of the binary one, in the same\n\
+             run. Parity is between the records of the GPU and the photons of `trace_plan` with the same\n\
+             options, neighbours checked on both sides: the largest distance of landing points relative to\n\
+             the scene, of fluxes, and of footprints' axes relative to the longer one; *from neighbours* are\n\
+             footprints that the check replaced. *Batch* is all memory that tracing these photons occupies\n\
+             besides the scene.\n";
+    text
 }
 
 /// The words of a buffer.

@@ -27,9 +27,9 @@ pub struct FootprintRecord {
     pub object: u32,
     /// Unit geometric normal of the receiver, on the side on which the photon landed.
     pub normal: [f32; 3],
-    /// Number of the emitted photon that this is a part of, among those of all lights. Records of
-    /// one photon stand in the buffer in the order in which its branches landed, so that a stable
-    /// sort by this number gives the same order in every run.
+    /// Number of the emitted photon that this is a part of, among those of all lights. Records are
+    /// in the order of these numbers, and those of one photon in the order in which its branches
+    /// landed.
     pub photon: u32,
 }
 

@@ -24,6 +24,24 @@ pub(crate) struct Node {
     pub(crate) is_leaf: u32,
 }
 
+/// Set in a wide node's child that is a primitive.
+pub(crate) const LEAF_BIT: u32 = 1 << 30;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct WideNode {
+    pub(crate) origin: [f32; 3],
+    /// Of the steps: a byte for each axis, biased by 127.
+    pub(crate) exponents: u32,
+    /// For each axis a byte for each child.
+    pub(crate) low: [u32; 3],
+    pub(crate) unused_a: u32,
+    pub(crate) high: [u32; 3],
+    pub(crate) unused_b: u32,
+    /// Nodes; or with [`LEAF_BIT`] primitives; or [`NO_PRIMITIVE`].
+    pub(crate) children: [u32; 4],
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Vertex {

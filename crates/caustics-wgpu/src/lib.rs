@@ -82,7 +82,7 @@
 //! | say where light comes from | [`FrameLight`]; [`SceneBuffers`] and [`TracePlan`], or [`FootprintBatch`]es |
 //! | choose how footprints become pixels | [`SplatOptions`], [`SplatMethod`], [`SplatKernel`] |
 //! | know the light at any point, in a shader of one's own or from a buffer | [`Gather`] |
-//! | trace photons alone | [`PhotonTracer`], [`PhotonBuffers`], [`TraceCounters`] |
+//! | trace photons alone | [`PhotonTracer`], [`Hierarchy`], [`PhotonBuffers`], [`TraceCounters`] |
 //! | let the scene move without building it anew | [`SceneRefit`] |
 //! | keep a photon where both sides can read it | [`FootprintRecord`] |
 //! | know what became of footprints, and how long passes took | [`PreparedFrame`], [`SplatStats`], [`PassTime`] |
@@ -100,9 +100,12 @@
 //! Triangles stay watertight on all of them; products whose rounding matters are hidden from the
 //! optimiser, and exact spheres are met in pairs of floats.
 //!
-//! Records are appended in any order. Those of one photon keep theirs, so that a stable sort by
-//! [`FootprintRecord::photon`], or the [links](PhotonBuffers::links) between them, give the same
-//! order in every run. Sums of energy are integers and do not depend on it.
+//! Photons land in any order; then their records are put in that of the photons, by a prefix sum over
+//! how many each has. On the way, each footprint of a lattice is checked against where the photons
+//! beside it landed on the same path, as
+//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says: so the records are
+//! those of the CPU's photons, in their order, the same bits in every run. Sums of energy are
+//! integers and do not depend on any order.
 //!
 //! # How a splat is made
 //!
@@ -118,7 +121,9 @@
 //! # Limits
 //!
 //! The tracer takes no refined lattices, numbers at most 2¹⁶ dielectrics, and binds each kind of
-//! data whole: two million triangles in 128 MiB. 28 branches of a photon may wait; beyond 24 it goes
+//! data whole: two million triangles in 128 MiB. Where there is no room for all records of a batch,
+//! which of them are lost is another matter in every run; batches that are smaller than all photons
+//! trace a row of the lattice on either side again, for the check of footprints. 28 branches of a photon may wait; beyond 24 it goes
 //! one way at each surface. They take 3 to 5 KB of an invocation's memory. A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one
 //! batch fit one binding, 1.6 million in 128 MiB; more are several batches. A view takes about 70
 //! bytes a pixel, in half floats and eight layers 200. On a browser's device, errors arrive after the
@@ -128,7 +133,7 @@
 //!
 //! Woop, Benthin, Wald 2013 and Haines, Günther, Akenine-Möller 2019 for hits, Jarzynski, Olano 2020
 //! for random numbers, Dekker 1971 for pairs of floats, Meister, Bittner 2018 (by obvhs) for the
-//! hierarchy; Igehy 1999 for footprints; Yang and Ouyang 2021 for splats of ellipses; Duff et al. 2017 for
+//! hierarchy, whose nodes are quantised after Ylitie, Karras, Laine 2017; Igehy 1999 for footprints; Yang and Ouyang 2021 for splats of ellipses; Duff et al. 2017 for
 //! frames. The rest is this workspace's own, and is derived where it stands.
 
 mod body_order;
@@ -143,6 +148,7 @@ mod gpu_scene;
 mod pass_layout;
 mod pass_times;
 mod photon_buffers;
+mod photon_order;
 mod photon_tracer;
 mod prefix_sum;
 mod recorder;
@@ -164,6 +170,7 @@ mod trace_counters;
 mod trace_params;
 mod trace_plan;
 mod view_params;
+mod wide_hierarchy;
 
 pub use camera_matrix::camera_matrix;
 pub use capabilities::Capabilities;
@@ -174,7 +181,7 @@ pub use gather::{Gather, GatherCounts, GatherOptions, GatherPoint};
 pub use glam;
 pub use pass_times::{FrameTimestamps, PassTime};
 pub use photon_buffers::PhotonBuffers;
-pub use photon_tracer::PhotonTracer;
+pub use photon_tracer::{Hierarchy, PhotonTracer};
 pub use recorder::RecordedWork;
 pub use renderer::{CausticsRenderer, FrameLight, FrameParams, PreparedFrame, RendererOptions};
 pub use renderer_error::{MissingLimit, RendererError};

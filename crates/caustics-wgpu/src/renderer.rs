@@ -313,11 +313,11 @@ impl CausticsRenderer {
             && room <= photons.saturating_mul(2).max(1);
         if !is_right {
             self.photons.clear();
-            for _ in 0..count {
-                let records = batch.saturating_mul(self.records_per_photon);
-                self.photons
-                    .push(PhotonBuffers::new(device, batch, records)?);
-            }
+            let records = batch.saturating_mul(self.records_per_photon);
+            let first = PhotonBuffers::new(device, batch, records)?;
+            let others = (1..count).map(|_| first.another(device));
+            self.photons = others.collect();
+            self.photons.push(first);
         }
         Ok(())
     }

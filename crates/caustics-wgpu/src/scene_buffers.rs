@@ -6,7 +6,7 @@ use caustics_scene::World;
 use crate::GpuError;
 use crate::body_order::BodyOrder;
 use crate::error_scope::filled_buffer;
-use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex};
+use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex, WideNode};
 use crate::renderer_error::RendererError;
 use crate::scene_hierarchy::SceneHierarchy;
 
@@ -18,6 +18,10 @@ use crate::scene_hierarchy::SceneHierarchy;
 #[derive(Clone, Debug)]
 pub struct SceneBuffers {
     pub(crate) nodes: wgpu::Buffer,
+    pub(crate) wide_nodes: wgpu::Buffer,
+    /// For each wide node the binary nodes that are its children.
+    pub(crate) wide_sources: wgpu::Buffer,
+    pub(crate) wide_count: u32,
     pub(crate) vertices: wgpu::Buffer,
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) bodies: wgpu::Buffer,
@@ -51,6 +55,10 @@ impl SceneBuffers {
         let hierarchy = SceneHierarchy::new(world, &BodyOrder::new(world)?);
         let mut bytes = 0;
         let nodes = upload::<Node>(device, "nodes", &hierarchy.nodes, &mut bytes)?;
+        let wide = &hierarchy.wide;
+        let wide_nodes = upload::<WideNode>(device, "wide nodes", &wide.nodes, &mut bytes)?;
+        let what = "children of wide nodes";
+        let wide_sources = upload::<[u32; 4]>(device, what, &wide.sources, &mut bytes)?;
         let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
         let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
         let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
@@ -58,6 +66,9 @@ impl SceneBuffers {
         let refit_order = upload::<u32>(device, "refit order", &order, &mut bytes)?;
         Ok(Self {
             nodes,
+            wide_nodes,
+            wide_sources,
+            wide_count: wide.nodes.len() as u32,
             vertices,
             triangles,
             bodies,

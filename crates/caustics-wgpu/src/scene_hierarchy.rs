@@ -1,4 +1,4 @@
-//! The binary hierarchy that the shaders traverse.
+//! The hierarchies that the shaders traverse.
 
 use std::ops::Range;
 
@@ -12,13 +12,17 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use crate::body_order::BodyOrder;
 use crate::gpu_scene::{NO_PRIMITIVE, Node, SPHERE_BIT};
+use crate::wide_hierarchy::WideHierarchy;
 
-/// Levels that the shader's stack has room for. A tree that needs more is built anew, by halving.
-pub(crate) const MAX_LEVELS: u32 = 64;
+/// Nodes that the shaders' stacks have room for. A tree that needs more is built anew, by halving.
+pub(crate) const MAX_WAITING: u32 = 64;
 
 /// Each box is wider on all sides by this part of the largest coordinate, so that a ray that runs in
 /// the plane of a box's side is inside.
-const MARGIN: f32 = 8.0 * f32::EPSILON;
+///
+/// What boxes of wide nodes are off by, relative to that coordinate, is less than a third of it: the
+/// rounding of a byte, and those of the distances to the node's origin and from there to the side.
+const MARGIN: f32 = 16.0 * f32::EPSILON;
 
 /// All primitives of a world in a tree whose leaves hold one each; the root is node 0.
 #[derive(Clone, Debug)]
@@ -28,6 +32,8 @@ pub(crate) struct SceneHierarchy {
     /// a later one's children are all in earlier rows.
     pub(crate) rows: Vec<Vec<u32>>,
     pub(crate) margin: f32,
+    /// The same primitives in nodes of four children.
+    pub(crate) wide: WideHierarchy,
 }
 
 /// The box of a primitive.
@@ -57,18 +63,26 @@ impl SceneHierarchy {
     pub(crate) fn new(world: &World, order: &BodyOrder) -> Self {
         let leaves = leaves(world, order);
         let margin = margin(&world.bounds());
-        let mut nodes = clustered(&leaves);
-        let mut rows = rows(&nodes);
-        if rows.len() as u32 >= MAX_LEVELS {
-            nodes = halved(&leaves);
-            rows = self::rows(&nodes);
-        }
-        let mut hierarchy = Self {
-            nodes,
-            rows,
-            margin,
+        let fitted = |nodes: Vec<Node>| {
+            let mut hierarchy = Self {
+                rows: rows(&nodes),
+                nodes,
+                margin,
+                wide: WideHierarchy::default(),
+            };
+            hierarchy.fit(&leaves);
+            hierarchy.wide = WideHierarchy::new(&hierarchy.nodes);
+            hierarchy
         };
-        hierarchy.fit(&leaves);
+        let hierarchy = fitted(clustered(&leaves));
+        // In the binary one as many wait as there are inner nodes above a leaf.
+        let waiting = hierarchy
+            .wide
+            .most_waiting()
+            .max(hierarchy.rows.len() as u32);
+        if waiting > MAX_WAITING {
+            return fitted(halved(&leaves));
+        }
         hierarchy
     }
 
@@ -278,7 +292,7 @@ mod tests {
             }
         }
         assert!(row_of.iter().all(Option::is_some));
-        assert!((rows.len() as u32) < MAX_LEVELS);
+        assert!((rows.len() as u32) < MAX_WAITING);
     }
 
     #[test]

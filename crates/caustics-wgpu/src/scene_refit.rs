@@ -5,6 +5,7 @@ use crate::GpuError;
 use crate::error_scope::filled_buffer;
 use crate::gpu_scene::PackedScene;
 use crate::pass_layout::{PassLayout, Slot};
+use crate::photon_order::dispatch;
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
@@ -16,6 +17,13 @@ const SHADER: Shader = Shader {
     pieces: &[shader_piece!("scene"), shader_piece!("refit")],
 };
 
+const WIDEN: Shader = Shader {
+    label: "widen",
+    pieces: &[shader_piece!("scene"), shader_piece!("widen")],
+};
+
+const WIDEN_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Read, Slot::Read, Slot::Write];
+
 /// What the shader binds, in the order of its bindings.
 const SLOTS: [Slot; 6] = [
     Slot::Uniform,
@@ -26,13 +34,11 @@ const SLOTS: [Slot; 6] = [
     Slot::Read,
 ];
 
-/// Nodes of one workgroup. Mirrors `REFIT_WORKGROUP_SIZE` in `shaders/refit.wgsl`.
+/// Nodes of one workgroup. Mirrors `REFIT_WORKGROUP_SIZE` in `shaders/refit.wgsl` and
+/// `WIDEN_WORKGROUP_SIZE` in `shaders/widen.wgsl`.
 const WORKGROUP_SIZE: u32 = 64;
 
-/// Workgroups of a dispatch along its first axis.
-const MAX_GROUPS: u32 = 32_768;
-
-/// Mirror of the struct of the same name in `shaders/refit.wgsl`.
+/// Mirror of the struct of the same name in `shaders/refit.wgsl`, and of `WidenParams`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct RefitRow {
@@ -50,6 +56,8 @@ struct RefitRow {
 pub struct SceneRefit {
     layout: PassLayout,
     pipeline: wgpu::ComputePipeline,
+    widen_layout: PassLayout,
+    widen: wgpu::ComputePipeline,
 }
 
 impl SceneRefit {
@@ -58,7 +66,15 @@ impl SceneRefit {
     pub fn new(device: &wgpu::Device) -> Self {
         let layout = PassLayout::new(device, "refit", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let pipeline = layout.compute(device, &SHADER, "refit", &[]);
-        Self { layout, pipeline }
+        let stage = wgpu::ShaderStages::COMPUTE;
+        let widen_layout = PassLayout::new(device, "widen", stage, &WIDEN_SLOTS);
+        let widen = widen_layout.compute(device, &WIDEN, "widen_nodes", &[]);
+        Self {
+            layout,
+            pipeline,
+            widen_layout,
+            widen,
+        }
     }
 
     /// Records the upload of a world's vertices, objects and materials, and fits the hierarchy to
@@ -141,14 +157,36 @@ impl SceneRefit {
             .map(wgpu::Buffer::as_entire_binding);
             rows.push((self.layout.bind(device, &resources), row.count));
         }
+        let all = RefitRow {
+            first: 0,
+            count: scene.wide_count,
+            margin: scene.margin,
+            unused: 0,
+        };
+        let uniform = filled_buffer(
+            device,
+            "widen",
+            wgpu::BufferUsages::UNIFORM,
+            bytemuck::bytes_of(&all),
+        )?;
+        let resources = [
+            &uniform,
+            &scene.nodes,
+            &scene.wide_sources,
+            &scene.wide_nodes,
+        ]
+        .map(wgpu::Buffer::as_entire_binding);
+        let widen = self.widen_layout.bind(device, &resources);
         let mut recorder = Recorder::new(encoder, None);
-        let mut pass = recorder.compute("refit", rows.len() as u32);
+        let mut pass = recorder.compute("refit", 1 + rows.len() as u32);
         pass.set_pipeline(&self.pipeline);
         for (group, count) in &rows {
             pass.set_bind_group(0, group, &[]);
-            let groups = count.div_ceil(WORKGROUP_SIZE);
-            pass.dispatch_workgroups(groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1);
+            dispatch(&mut pass, *count, WORKGROUP_SIZE);
         }
+        pass.set_pipeline(&self.widen);
+        pass.set_bind_group(0, &widen, &[]);
+        dispatch(&mut pass, scene.wide_count, WORKGROUP_SIZE);
         drop(pass);
         Ok(recorder.finish().1)
     }
@@ -160,7 +198,7 @@ mod tests {
     use crate::shader::{assert_layout, reflection};
 
     #[test]
-    fn the_shader_is_valid_and_agrees_with_rust() {
+    fn the_shaders_are_valid_and_agree_with_rust() {
         let (module, _) = reflection::validated(&SHADER).unwrap_or_else(|it| panic!("{it}"));
         let slots: Vec<(u32, Slot)> = (0..).zip(SLOTS).collect();
         assert_eq!(reflection::buffers(&module), slots);
@@ -176,6 +214,21 @@ mod tests {
                 margin,
                 unused
             }
+        );
+
+        let (module, _) = reflection::validated(&WIDEN).unwrap_or_else(|it| panic!("{it}"));
+        let slots: Vec<(u32, Slot)> = (0..).zip(WIDEN_SLOTS).collect();
+        assert_eq!(reflection::buffers(&module), slots);
+        let size = reflection::workgroup_size(&module, "widen_nodes");
+        assert_eq!(size, [WORKGROUP_SIZE, 1, 1]);
+        let (members, size) = reflection::layout(&module, "WidenParams");
+        assert_eq!(size, size_of::<RefitRow>() as u32);
+        assert_eq!(
+            members[1],
+            (
+                "count".to_owned(),
+                std::mem::offset_of!(RefitRow, count) as u32
+            )
         );
     }
 }

@@ -25,6 +25,7 @@ impl TraceCounters {
     pub(crate) const RAYS: usize = 15;
     pub(crate) const FALLBACKS: usize = 16;
     pub(crate) const BOUNDED: usize = 17;
+    pub(crate) const REPLACED: usize = 18;
     pub(crate) const SUMS: usize = 20;
 
     /// The fates in the order of the shader's lines, which further ones follow.
@@ -81,6 +82,7 @@ impl TraceCounters {
         ledger.rays = u64::from(words[Self::RAYS]);
         ledger.normal_fallbacks = u64::from(words[Self::FALLBACKS]);
         ledger.bounded_differentials = u64::from(words[Self::BOUNDED]);
+        ledger.replaced_differentials = u64::from(words[Self::REPLACED]);
         Ok(Self {
             stored: words[Self::STORED],
             ledger,

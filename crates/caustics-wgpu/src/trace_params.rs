@@ -83,7 +83,12 @@ pub(crate) struct TraceParams {
     pub(crate) flux_scale: f32,
     pub(crate) first_link: u32,
     pub(crate) root: u32,
-    pub(crate) unused_a: u32,
-    pub(crate) unused_b: u32,
+    pub(crate) flags: u32,
+    pub(crate) slots: u32,
     pub(crate) emitters: [Emitter; MAX_EMITTERS],
+}
+
+impl TraceParams {
+    pub(crate) const CHECKS: u32 = 1;
+    pub(crate) const NEIGHBOURS_ONLY: u32 = 2;
 }

@@ -1,5 +1,6 @@
 use std::collections::HashMap;
 use std::f32::consts::PI;
+use std::ops::Range;
 
 use caustics_accel::Intersect;
 use caustics_geometry::Frame;
@@ -167,6 +168,35 @@ impl TracePlan {
             self.lists.extend_from_slice(map.words());
         }
         sample_from(mirror, &self.options);
+    }
+
+    /// Whether footprints of rays with so many parameters are checked against where the photons
+    /// beside them land.
+    pub(crate) fn checks_footprints(&self, dimensions: u32) -> bool {
+        self.options.check_footprints
+            && self.options.differentials
+            && self.options.sequence == Sequence::Grid
+            && dimensions == 2
+    }
+
+    /// The photons of a batch with those that the check of its footprints asks for: on either side
+    /// up to a row of the lattice.
+    pub(crate) fn with_neighbours(&self, photons: &Range<u32>) -> Range<u32> {
+        let mut all = photons.clone();
+        for PlannedEmitter { mirror, dimensions } in &self.emitters {
+            if mirror.count == 0 || !self.checks_footprints(*dimensions) {
+                continue;
+            }
+            let own = mirror.first..mirror.first + mirror.count;
+            let row = mirror.points.div_ceil(mirror.rows.max(1)) + 1;
+            if own.contains(&photons.start) {
+                all.start = own.start.max(photons.start.saturating_sub(row));
+            }
+            if photons.start < photons.end && own.contains(&(photons.end - 1)) {
+                all.end = own.end.min(photons.end.saturating_add(row));
+            }
+        }
+        all
     }
 
     pub(crate) fn sequence(&self) -> u32 {

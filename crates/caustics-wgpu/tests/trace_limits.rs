@@ -16,7 +16,9 @@ use caustics_wgpu::{
 };
 
 use common::scenes::{add_mesh, floor, glass, lamp, lit};
-use common::tracing::{Difference, Stage, read, shared_tracer, trace_on_gpu, trails_by_cpu};
+use common::tracing::{
+    Difference, Stage, read, records_of, shared_tracer, trace_on_gpu, trails_by_cpu,
+};
 use common::words;
 
 const PHOTONS: u32 = 4_000;
@@ -44,7 +46,7 @@ fn batches_have_the_photons_of_one_run() {
 
     let scene = SceneBuffers::new(device, &stage.world).unwrap();
     let buffers = PhotonBuffers::new(device, 1_500, 16_000).unwrap();
-    let mut records = 0;
+    let mut photons = Vec::new();
     for (number, first) in (0..PHOTONS).step_by(1_500).enumerate() {
         let mut encoder = encoder(device);
         if number == 0 {
@@ -56,17 +58,13 @@ fn batches_have_the_photons_of_one_run() {
         let work = tracer
             .trace(device, &mut encoder, &scene, &plan, batch.clone(), &buffers)
             .unwrap();
-        assert_eq!((work.passes, work.dispatches), (1, 1));
+        // Its photons, those beside it, and five for their order.
+        let beside = u32::from(batch.start > 0) + u32::from(batch.end < PHOTONS);
+        assert_eq!((work.passes, work.dispatches), (2, 1 + beside + 5));
         queue.submit([encoder.finish()]);
-        let stored = words(device, queue, buffers.counters())[0];
-        let expected = &whole.photons[batch.start as usize..batch.end as usize];
-        assert_eq!(
-            stored as usize,
-            expected.iter().map(Vec::len).sum::<usize>()
-        );
-        records += stored;
+        photons.extend(records_of(device, queue, &buffers, batch));
     }
-    assert_eq!(records, whole.counters.stored);
+    assert!(photons == whole.photons);
     // Sums of integers: the same to the last bit, whatever their order.
     let counters = TraceCounters::new(&words(device, queue, buffers.counters()), &plan).unwrap();
     assert_eq!(counters.ledger, whole.counters.ledger);
@@ -77,11 +75,40 @@ fn the_same_photons_again_have_the_same_bits() {
     let Some((gpu, tracer)) = shared_tracer() else {
         return;
     };
-    let stage = lit(glass(), lamp());
-    let plan = stage.plan(&options());
-    let runs = [(); 2].map(|()| trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS));
-    assert!(runs[0].photons == runs[1].photons);
-    assert_eq!(runs[0].counters, runs[1].counters);
+    let (device, queue) = gpu;
+    // Many more than one workgroup has, with several parts each.
+    let stage = Stage::load("p04_sphere_in_box.glb");
+    let options = TraceOptions {
+        photons: 5 * PHOTONS,
+        ..options()
+    };
+    let plan = stage.plan(&options);
+    let scene = SceneBuffers::new(device, &stage.world).unwrap();
+    let buffers = PhotonBuffers::new(device, plan.photons(), 8 * PHOTONS * 5).unwrap();
+    let run = || {
+        let mut encoder = encoder(device);
+        buffers.clear(&mut encoder);
+        let all = 0..plan.photons();
+        tracer
+            .trace(device, &mut encoder, &scene, &plan, all, &buffers)
+            .unwrap();
+        queue.submit([encoder.finish()]);
+        let counters = words(device, queue, buffers.counters());
+        let stored = counters[0] as usize;
+        let mut records = words(device, queue, buffers.records());
+        records.truncate(20 * stored);
+        let mut paths = words(device, queue, buffers.paths());
+        paths.truncate(stored);
+        let starts = words(device, queue, buffers.starts());
+        [counters, records, paths, starts]
+    };
+    let first = run();
+    assert!(first[2].len() > 2 * plan.photons() as usize);
+    let numbers = first[1].chunks_exact(20).map(|record| record[19]);
+    assert!(numbers.is_sorted());
+    for _ in 0..3 {
+        assert!(run() == first);
+    }
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! On the ten scenes the GPU traces the photons that the CPU traces, one by one.
+//! On the ten scenes the GPU traces the photons that the CPU traces by default, one by one, with
+//! their footprints checked against the neighbours'.
 
 mod common;
 
@@ -28,13 +29,14 @@ fn the_same_photons_land_in_the_same_places() {
         let difference = Difference::between(&stage.world, &trails, &traced);
         println!(
             "{name}: {} of {PHOTONS} on other paths, {} of {} records equal in every bit, \
-             position {:.0e}, flux {:.0e}, axes {:.0e}",
+             position {:.0e}, flux {:.0e}, axes {:.0e}, footprints from neighbours {}",
             difference.other_paths(),
             difference.equal_records.0,
             difference.equal_records.1,
             difference.position,
             difference.flux,
             difference.axes,
+            traced.counters.ledger.replaced_differentials,
         );
         for (cause, (count, first)) in difference.first_of_paths() {
             println!("  {cause}: {count}, the first {first:?}");
@@ -48,6 +50,9 @@ fn the_same_photons_land_in_the_same_places() {
         assert_eq!(traced.counters.crowded.count, 0, "{name}");
         assert!(traced.counters.ledger.imbalance() < 1e-6, "{name}");
         assert!(difference.equal_records.1 > 1000, "{name}");
+        // Lights with an area have no lattice of two parameters.
+        let is_checked = name != "p09_cornell.glb";
+        assert_eq!(ledger.replaced_differentials > 0, is_checked, "{name}");
     }
     assert_eq!(beyond, Vec::<String>::new());
 }
@@ -69,6 +74,21 @@ fn other_photons_are_told_apart() {
     let trails = trails_by_cpu(&stage, &other);
     let difference = Difference::between(&stage.world, &trails, &traced);
     assert_eq!(difference.beyond_promise(trails.len()).len(), 5);
+    // Footprints that are not checked.
+    let trails = trails_by_cpu(&stage, &options);
+    let raw = TraceOptions {
+        check_footprints: false,
+        ..options
+    };
+    let raw = trace_on_gpu(gpu, tracer, &stage, &stage.plan(&raw), 10_000);
+    let difference = Difference::between(&stage.world, &trails, &raw);
+    assert_eq!(difference.other_paths(), 0);
+    assert!(difference.axes > 0.5 && difference.position > 1e-4);
+    let ledger = ledger_of(&trails, &plan);
+    assert_eq!(
+        unlike_lines(&raw.counters.ledger, &ledger, trails.len()).len(),
+        1
+    );
     // A ledger of fewer photons.
     let ledger = ledger_of(&trails[..1_000], &plan);
     assert!(!unlike_lines(&traced.counters.ledger, &ledger, trails.len()).is_empty());

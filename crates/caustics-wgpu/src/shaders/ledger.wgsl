@@ -29,6 +29,7 @@ const COUNTER_LINES: u32 = 2u;
 const COUNTER_RAYS: u32 = 15u;
 const COUNTER_FALLBACKS: u32 = 16u;
 const COUNTER_BOUNDED: u32 = 17u;
+const COUNTER_REPLACED: u32 = 18u;
 const COUNTER_SUMS: u32 = 20u;
 const COUNTERS: u32 = 98u;
 
@@ -57,8 +58,12 @@ fn book(line: u32, flux: vec3<f32>) {
     }
 }
 
-// Adds the workgroup's sums to the buffer's. After a barrier, by all of its invocations.
+// Adds the workgroup's sums to the buffer's. After a barrier, by all of its invocations. Photons that
+// are traced as neighbours only are booked with the batch that they are of.
 fn publish_ledger(invocation: u32, invocations: u32) {
+    if (trace.flags & FLAG_NEIGHBOURS_ONLY) != 0u {
+        return;
+    }
     for (var i = COUNTER_LOST + invocation; i < COUNTER_SUMS; i += invocations) {
         let counted = atomicLoad(&group_counters[i]);
         if counted > 0u {

@@ -61,15 +61,10 @@ fn emitter_covers(emitter: u32, ray: Ray) -> bool {
     return map == NO_MAP || map_contains(map, point);
 }
 
-// Whether another emitter of the same light stands for an emitted ray that first meets this body, or
-// `NO_BODY`.
-fn is_overlap(emitter: u32, ray: Ray, body: u32) -> bool {
-    let caster = trace.emitters[emitter].caster;
-    if caster == NO_CASTER {
+// Whether an earlier emitter of the same light covers an emitted ray too.
+fn is_covered(emitter: u32, ray: Ray) -> bool {
+    if trace.emitters[emitter].caster == NO_CASTER {
         return false;
-    }
-    if body != NO_BODY && bodies[body].caster != NO_CASTER {
-        return bodies[body].caster != caster;
     }
     for (var earlier = trace.emitters[emitter].first_of_light; earlier < emitter; earlier++) {
         if emitter_covers(earlier, ray) {
@@ -77,4 +72,17 @@ fn is_overlap(emitter: u32, ray: Ray, body: u32) -> bool {
         }
     }
     return false;
+}
+
+// Whether another emitter of the same light stands for an emitted ray that first meets this body, or
+// `NO_BODY`; `covered` is what `is_covered` says of it.
+fn is_overlap(emitter: u32, covered: bool, body: u32) -> bool {
+    let caster = trace.emitters[emitter].caster;
+    if caster == NO_CASTER {
+        return false;
+    }
+    if body != NO_BODY && bodies[body].caster != NO_CASTER {
+        return bodies[body].caster != caster;
+    }
+    return covered;
 }

@@ -1,5 +1,5 @@
-// The sample that a photon is made from. Twins: point_set.rs, grid.rs, rank1_lattice.rs and
-// kronecker.rs in caustics-sampling; `EmissionSample` in caustics-trace.
+// The sample that a photon is made from. Twins: point_set.rs, rank1_lattice.rs and kronecker.rs in
+// caustics-sampling; `EmissionSample` in caustics-trace.
 
 struct EmissionSample {
     point: vec2<f32>,
@@ -7,30 +7,6 @@ struct EmissionSample {
     spacing: array<vec2<f32>, 2>,
     // Chooses the place on an area light.
     place: vec2<f32>,
-}
-
-struct GridCell {
-    corner: vec2<f32>,
-    size: vec2<f32>,
-    row: u32,
-    column: u32,
-}
-
-fn grid_cell(count: u32, rows: u32, index: u32) -> GridCell {
-    let short_columns = count / rows;
-    let longer_rows = count % rows;
-    let in_longer_rows = longer_rows * (short_columns + 1u);
-    let is_longer = index < in_longer_rows;
-    let columns = short_columns + select(0u, 1u, is_longer);
-    let after = select(index - in_longer_rows, index, is_longer);
-    let row = after / columns + select(longer_rows, 0u, is_longer);
-    let column = after % columns;
-    return GridCell(
-        vec2(f32(column) / f32(columns), f32(index - column) / f32(count)),
-        vec2(1.0 / f32(columns), f32(columns) / f32(count)),
-        row,
-        column,
-    );
 }
 
 fn spread_bits(x: u32) -> u32 {
@@ -95,25 +71,4 @@ fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
         result.place = vec2(sobol(index, 4u), sobol(index, 5u));
     }
     return result;
-}
-
-// The number, in the whole set, of the point of an emitter's photon. Twin: lattice.rs in
-// caustics-trace.
-fn point_number(emitter: u32, index: u32) -> u32 {
-    let first = trace.emitters[emitter].first_span;
-    var low = 0u;
-    var high = trace.emitters[emitter].span_count;
-    if high == 0u {
-        return index;
-    }
-    // The last run that does not begin after it.
-    while low + 1u < high {
-        let middle = (low + high) / 2u;
-        if emission_lists[first + 2u * middle + 1u] <= index {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return emission_lists[first + 2u * low] + (index - emission_lists[first + 2u * low + 1u]);
 }

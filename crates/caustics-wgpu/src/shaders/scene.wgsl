@@ -9,6 +9,23 @@ struct Node {
     is_leaf: u32,
 }
 
+// Up to four boxes and what is in them, in 255 steps along each axis from the lowest corner of all.
+struct WideNode {
+    origin: vec3<f32>,
+    // Of the steps, powers of two: a byte for each axis, biased by 127.
+    exponents: u32,
+    // A byte for each child.
+    low: vec3<u32>,
+    unused_a: u32,
+    high: vec3<u32>,
+    unused_b: u32,
+    // Nodes; or with `LEAF_BIT` primitives; or `NO_PRIMITIVE`.
+    children: vec4<u32>,
+}
+
+// Set in a wide node's child that is a primitive. All bits of `NO_PRIMITIVE` are.
+const LEAF_BIT: u32 = 0x40000000u;
+
 struct Vertex {
     position: vec3<f32>,
     normal_x: f32,

@@ -94,11 +94,16 @@ struct TraceParams {
     // Where in `links` the records' entries begin.
     first_link: u32,
     root: u32,
-    // No members: a uniform struct is a multiple of 16 bytes.
-    unused_a: u32,
-    unused_b: u32,
+    flags: u32,
+    // Photons that are traced for the batch: its own, and those beside them.
+    slots: u32,
     emitters: array<Emitter, MAX_EMITTERS>,
 }
+
+// Footprints are checked against where neighbours landed.
+const FLAG_CHECKS: u32 = 1u;
+// These photons are of other batches, and are traced as neighbours of this one's.
+const FLAG_NEIGHBOURS_ONLY: u32 = 2u;
 
 const EMITTER_SPHERE: u32 = 0u;
 const EMITTER_CONE: u32 = 1u;

@@ -1,4 +1,7 @@
 // From light to receiver. Twins: tracer.rs and trace.rs in caustics-trace.
+//
+// Each place that books is worth its sums on adapters that run all that is in a loop, so there are
+// few of them.
 
 // Branches of one photon that wait. Where no more than a few have room left, photons go one way, as
 // with `BRANCHING_ROULETTE`; what finds no room even so is booked as crowded.
@@ -9,6 +12,9 @@ const RESERVED_PENDING: u32 = 4u;
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
 
 const ALL_CHANNELS: u32 = 3u;
+
+// No line of the ledger.
+const NO_LINE: u32 = 0xffffffffu;
 
 // A path, or a branch of one, on its way to the next surface.
 struct Branch {
@@ -24,6 +30,8 @@ struct Branch {
     channel: u32,
     // A hash of what the path met and did there.
     path: u32,
+    // Whether its footprint was widened for paths that ended where it went on.
+    is_thinned: bool,
 }
 
 var<private> pending: array<Branch, MAX_PENDING>;
@@ -32,16 +40,18 @@ var<private> pending_count: u32;
 var<private> threshold: f32;
 var<private> photon_number: u32;
 var<private> photon_emitter: u32;
+// Whether its ray is one of an earlier emitter's too.
+var<private> photon_covered: bool;
 
 fn extended(path: u32, object: u32, event: u32) -> u32 {
     let word = object * 4u + event + 0x9e3779b9u;
     return (((path << 5u) | (path >> 27u)) ^ word) * 0x01000193u;
 }
 
-fn receive(branch: Branch, point: SurfacePoint) {
+// Stores light that has landed, and says what became of it.
+fn receive(branch: Branch, point: SurfacePoint) -> u32 {
     if branch.events == 0u {
-        book(FATE_DIRECT, branch.flux);
-        return;
+        return FATE_DIRECT;
     }
     let axes = footprint_axes(branch.differential, point.geometric_normal);
     let side = select(-1.0, 1.0, point.from_outside);
@@ -58,8 +68,8 @@ fn receive(branch: Branch, point: SurfacePoint) {
         side * point.geometric_normal,
         photon_number,
     );
-    let has_room = store_photon(record, branch.path);
-    book(select(FATE_CROWDED, FATE_STORED, has_room), branch.flux);
+    let has_room = store_photon(record, branch.path, branch.is_thinned);
+    return select(FATE_CROWDED, FATE_STORED, has_room);
 }
 
 // Queues one outgoing direction, if roulette lets it live. `chosen` is the part of such paths that
@@ -78,20 +88,29 @@ fn follow(
     if strongest <= 0.0 {
         return;
     }
-    if strongest < threshold {
-        let survival = strongest / threshold;
-        if random_next() >= survival {
-            book(FATE_ROULETTE, flux);
-            return;
-        }
-        let stronger = flux / survival;
-        book(LINE_ROULETTE_GAIN, stronger - flux);
-        flux = stronger;
-        kept *= survival;
-    }
+    // What is booked of it here, and whether it ends.
+    var line = NO_LINE;
+    var booked = flux;
+    var ends = false;
     if pending_count == MAX_PENDING {
         count_up(COUNTER_LOST, 1u);
-        book(FATE_CROWDED, flux);
+        line = FATE_CROWDED;
+        ends = true;
+    } else if strongest < threshold {
+        let survival = strongest / threshold;
+        ends = random_next() >= survival;
+        line = FATE_ROULETTE;
+        if !ends {
+            line = LINE_ROULETTE_GAIN;
+            flux = flux_given / survival;
+            booked = flux - flux_given;
+            kept *= survival;
+        }
+    }
+    if line != NO_LINE {
+        book(line, booked);
+    }
+    if ends {
         return;
     }
     var differential = branch.differential;
@@ -128,6 +147,7 @@ fn follow(
         branch.has_split,
         branch.channel,
         extended(branch.path, object, 1u + outgoing.event),
+        branch.is_thinned || kept < 1.0,
     );
     pending_count += 1u;
 }
@@ -165,38 +185,42 @@ fn branch_out(branch_given: Branch, point: SurfacePoint) {
 // Takes a branch to the next surface and queues what leaves it.
 fn advance(branch_given: Branch) {
     var branch = branch_given;
-    if !(all_finite(branch.ray.origin) && all_finite(branch.ray.direction)) {
-        book(FATE_INVALID, branch.flux);
-        return;
-    }
-    count_up(COUNTER_RAYS, 1u);
-    let hit = closest_hit(branch.ray);
-    let misses = hit.primitive == NO_PRIMITIVE;
+    // What becomes of it, where it goes no further.
+    var fate = NO_LINE;
     var point: SurfacePoint;
     point.body = NO_BODY;
-    if !misses {
-        point = surface_at(branch.ray, hit);
-        if !point.is_valid {
-            book(FATE_INVALID, branch.flux);
-            return;
+    var distance = 0.0;
+    if all_finite(branch.ray.origin) && all_finite(branch.ray.direction) {
+        count_up(COUNTER_RAYS, 1u);
+        let hit = closest_hit(branch.ray);
+        distance = hit.t;
+        if hit.primitive == NO_PRIMITIVE {
+            fate = select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u);
+        } else {
+            point = surface_at(branch.ray, hit);
+            if !point.is_valid {
+                fate = FATE_INVALID;
+            }
         }
+        if branch.depth == 0u && fate != FATE_INVALID
+            && is_overlap(photon_emitter, photon_covered, point.body) {
+            fate = FATE_OVERLAP;
+        }
+    } else {
+        fate = FATE_INVALID;
     }
-    if branch.depth == 0u && is_overlap(photon_emitter, branch.ray, point.body) {
-        book(FATE_OVERLAP, branch.flux);
-        return;
-    }
-    if misses {
-        book(select(FATE_ESCAPED, FATE_MISSED, branch.events == 0u), branch.flux);
+    if fate != NO_LINE {
+        book(fate, branch.flux);
         return;
     }
     let medium = current_medium(branch.media);
     if medium != NO_BODY && any(bodies[medium].color != vec3(0.0)) {
-        let arriving = branch.flux * beer_lambert(bodies[medium].color, hit.t);
+        let arriving = branch.flux * beer_lambert(bodies[medium].color, distance);
         book(FATE_ABSORBED, branch.flux - arriving);
         branch.flux = arriving;
     }
     branch.differential = transferred(
-        branch.differential, branch.ray.direction, hit.t, point.geometric_normal);
+        branch.differential, branch.ray.direction, distance, point.geometric_normal);
     branch.depth += 1u;
 
     let kind = bodies[point.body].kind;
@@ -211,22 +235,22 @@ fn advance(branch_given: Branch) {
                 continue;
             }
         }
+        fate = NO_LINE;
         if kind == BODY_RECEIVER {
-            receive(branch, point);
+            fate = receive(branch, point);
         } else if branch.depth >= trace.max_depth {
-            book(FATE_TOO_DEEP, branch.flux);
+            fate = FATE_TOO_DEEP;
         } else {
             branch_out(branch, point);
+        }
+        if fate != NO_LINE {
+            book(fate, branch.flux);
         }
     }
 }
 
 fn trace_photon(number: u32) {
-    // The emitter whose photons these are: the last that does not begin after it.
-    var emitter = 0u;
-    while emitter + 1u < trace.emitter_count && trace.emitters[emitter + 1u].first <= number {
-        emitter += 1u;
-    }
+    let emitter = emitter_of(number);
     photon_number = number;
     photon_emitter = emitter;
     last_record = 0u;
@@ -236,6 +260,7 @@ fn trace_photon(number: u32) {
     let emission = emit(emitter, point);
     if emission.is_valid {
         book(LINE_EMITTED, emission.flux);
+        photon_covered = is_covered(emitter, emission.ray);
         threshold = trace.min_weight * largest(emission.flux);
         pending[0] = Branch(
             emission.ray,
@@ -247,6 +272,7 @@ fn trace_photon(number: u32) {
             false,
             ALL_CHANNELS,
             0u,
+            false,
         );
         pending_count = 1u;
     }
@@ -254,7 +280,7 @@ fn trace_photon(number: u32) {
         pending_count -= 1u;
         advance(pending[pending_count]);
     }
-    links[number - trace.batch_first] = last_record;
+    links[slot_of(number)] = last_record;
 }
 
 const WORKGROUP_SIZE: u32 = 64u;

@@ -43,14 +43,17 @@ fn exact_edge_function(p: vec2<f32>, q: vec2<f32>) -> f32 {
     return double_sum(exact_product(p.x, q.y), double_negated(exact_product(p.y, q.x))).high;
 }
 
+// What `intersect_triangle` gives for `t` where all edge functions vanish.
+const DOUBTFUL: f32 = -2.0;
+
 // Where the ray meets the triangle, with `t` not above 0 where it does not.
 fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c_world: vec3<f32>) -> vec3<f32> {
     let missed = vec3(-1.0);
-    var a = sheared(ray, a_world);
-    var b = sheared(ray, b_world);
-    var c = sheared(ray, c_world);
+    let a = sheared(ray, a_world);
+    let b = sheared(ray, b_world);
+    let c = sheared(ray, c_world);
     let depth = vec3(a.z, b.z, c.z);
-    var weights = vec3(
+    let weights = vec3(
         edge_function(c.xy, b.xy),
         edge_function(a.xy, c.xy),
         edge_function(b.xy, a.xy),
@@ -58,30 +61,38 @@ fn intersect_triangle(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c
     if any(weights < vec3(0.0)) && any(weights > vec3(0.0)) {
         return missed;
     }
-    var sum = weights.x + weights.y + weights.z;
+    let sum = weights.x + weights.y + weights.z;
     if abs(sum) < SMALLEST_NORMAL {
-        let size = max(
-            max(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y))),
-            max(abs(c.x), abs(c.y)),
-        );
-        if !(size > 0.0) {
-            return missed;
-        }
-        let scale = 1.0 / size;
-        a = vec3(scale * a.xy, a.z);
-        b = vec3(scale * b.xy, b.z);
-        c = vec3(scale * c.xy, c.z);
-        weights = vec3(
-            exact_edge_function(c.xy, b.xy),
-            exact_edge_function(a.xy, c.xy),
-            exact_edge_function(b.xy, a.xy),
-        );
-        sum = weights.x + weights.y + weights.z;
-        let crosses = any(weights < vec3(0.0)) && any(weights > vec3(0.0));
-        if crosses || abs(sum) < SMALLEST_NORMAL {
-            return missed;
-        }
+        return vec3(DOUBTFUL);
     }
     let along = weights.x * depth.x + weights.y * depth.y + weights.z * depth.z;
+    return vec3(along * ray.shear.z / sum, weights.y / sum, weights.z / sum);
+}
+
+// The same where all edge functions vanish.
+fn intersect_triangle_exactly(ray: ShearedRay, a_world: vec3<f32>, b_world: vec3<f32>, c_world: vec3<f32>) -> vec3<f32> {
+    let missed = vec3(-1.0);
+    let a = sheared(ray, a_world);
+    let b = sheared(ray, b_world);
+    let c = sheared(ray, c_world);
+    let size = max(
+        max(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y))),
+        max(abs(c.x), abs(c.y)),
+    );
+    if !(size > 0.0) {
+        return missed;
+    }
+    let scale = 1.0 / size;
+    let weights = vec3(
+        exact_edge_function(scale * c.xy, scale * b.xy),
+        exact_edge_function(scale * a.xy, scale * c.xy),
+        exact_edge_function(scale * b.xy, scale * a.xy),
+    );
+    let sum = weights.x + weights.y + weights.z;
+    let crosses = any(weights < vec3(0.0)) && any(weights > vec3(0.0));
+    if crosses || abs(sum) < SMALLEST_NORMAL {
+        return missed;
+    }
+    let along = weights.x * a.z + weights.y * b.z + weights.z * c.z;
     return vec3(along * ray.shear.z / sum, weights.y / sum, weights.z / sum);
 }

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use caustics_scene::gltf::load_path;
 use caustics_scene::{BvhOptions, SceneIntersector, World};
 use caustics_trace::{
-    EmissionPlan, EnergyLedger, Fate, Photon, PhotonTrail, TraceOptions, trace_photon,
+    EmissionPlan, EnergyLedger, Fate, FootprintSource, Photon, PhotonTrail, TraceOptions,
+    trace_photon, trace_plan,
 };
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
@@ -55,12 +57,28 @@ impl Stage {
     }
 }
 
-/// The trails of all photons by the CPU, in the order of their numbers.
+/// The trails of all photons by the CPU, in the order of their numbers, with their footprints as
+/// [`trace_plan`] leaves them: checked against the neighbours', where the options ask for it.
 pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
     let Stage { world, rays } = stage;
     let plan = EmissionPlan::new(world, rays, options).unwrap();
     let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
-    (0..plan.count()).map(trail).collect()
+    let mut trails: Vec<_> = (0..plan.count()).map(trail).collect();
+    let map = trace_plan(world, rays, &plan, options, &|_| {}).unwrap();
+    let mut checked = map.photons.into_iter();
+    for trail in &mut trails {
+        for photon in &mut trail.photons {
+            let checked = checked.next().unwrap();
+            assert_eq!(photon.incoming, checked.incoming);
+            *photon = checked;
+            let is_replaced = photon.source == FootprintSource::Neighbour;
+            trail.ledger.replaced_differentials += u64::from(is_replaced);
+        }
+    }
+    assert_eq!(checked.next(), None);
+    let replaced = trails.iter().map(|it| it.ledger.replaced_differentials);
+    assert_eq!(replaced.sum::<u64>(), map.ledger.replaced_differentials);
+    trails
 }
 
 /// The shared device, and the tracer that its tests share.
@@ -108,26 +126,32 @@ pub(crate) fn read(
     buffers: &PhotonBuffers,
 ) -> Traced {
     let counters = TraceCounters::new(&words(device, queue, buffers.counters()), plan).unwrap();
-    let records = words(device, queue, buffers.records());
-    let records: &[FootprintRecord] = bytemuck::cast_slice(&records);
-    let links = words(device, queue, buffers.links());
-    let links_of_records = &links[buffers.photons() as usize..];
-    let stored = |photon: u32| {
-        let mut stored = Vec::new();
-        let mut next = links[photon as usize];
-        while next != 0 {
-            let record = next as usize - 1;
-            assert_eq!(records[record].photon, photon, "record {record}");
-            stored.push((links_of_records[2 * record + 1], records[record]));
-            next = links_of_records[2 * record];
-        }
-        stored.reverse();
-        stored
-    };
-    let photons: Vec<Stored> = (0..plan.photons()).map(stored).collect();
+    let photons = records_of(device, queue, buffers, 0..plan.photons());
     let reachable: usize = photons.iter().map(Vec::len).sum();
     assert_eq!(reachable, counters.stored as usize);
     Traced { photons, counters }
+}
+
+/// Reads back what each photon of a batch has stored.
+pub(crate) fn records_of(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    buffers: &PhotonBuffers,
+    batch: Range<u32>,
+) -> Vec<Stored> {
+    let records = words(device, queue, buffers.records());
+    let records: &[FootprintRecord] = bytemuck::cast_slice(&records);
+    let paths = words(device, queue, buffers.paths());
+    let starts = words(device, queue, buffers.starts());
+    let stored = |(place, photon): (usize, u32)| {
+        let range = starts[place] as usize..starts[place + 1] as usize;
+        let stored = range.map(|record| {
+            assert_eq!(records[record].photon, photon, "record {record}");
+            (paths[record], records[record])
+        });
+        stored.collect()
+    };
+    (0..).zip(batch).map(stored).collect()
 }
 
 /// How many photons a message names of each cause.
@@ -266,7 +290,7 @@ pub(crate) fn ledger_of(trails: &[PhotonTrail], plan: &TracePlan) -> EnergyLedge
 }
 
 /// Lines of two ledgers whose counts differ by more than a thousandth of the photons or whose flux
-/// by more than 10⁻⁴ of what was emitted.
+/// by more than 10⁻⁴ of what was emitted, and counts of differentials, likewise.
 pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -> Vec<String> {
     let emitted = a.emitted().flux.max_element();
     let unlike = |fate: &Fate| {
@@ -275,7 +299,19 @@ pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -
         1000 * one.count.abs_diff(other.count) > photons as u64 || flux > 1e-4 * emitted
     };
     let lines = Fate::ALL.into_iter().filter(unlike);
-    lines
-        .map(|fate| format!("{}: {:?}, {:?}", fate.name(), a.entry(fate), b.entry(fate)))
-        .collect()
+    let lines =
+        lines.map(|fate| format!("{}: {:?}, {:?}", fate.name(), a.entry(fate), b.entry(fate)));
+    let counts = [
+        (
+            "replaced",
+            a.replaced_differentials,
+            b.replaced_differentials,
+        ),
+        ("bounded", a.bounded_differentials, b.bounded_differentials),
+        ("fallbacks", a.normal_fallbacks, b.normal_fallbacks),
+    ];
+    let unlike = |(_, one, other): &(_, u64, u64)| 1000 * one.abs_diff(*other) > photons as u64;
+    let counts = counts.into_iter().filter(unlike);
+    let counts = counts.map(|(name, one, other)| format!("{name}: {one}, {other}"));
+    lines.chain(counts).collect()
 }

@@ -1,0 +1,3 @@
+// The binary hierarchy, for traverse.wgsl.
+
+@group(0) @binding(1) var<storage, read> nodes: array<Node>;

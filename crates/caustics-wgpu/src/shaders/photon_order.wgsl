@@ -1,0 +1,82 @@
+// Puts the records of a batch into the order of their photons, with their footprints checked. Twin:
+// traced.rs in caustics-trace.
+
+const ORDER_WORKGROUP_SIZE: u32 = 64u;
+
+// As the tracer appended them, with its links.
+@group(0) @binding(1) var<storage, read> appended: array<FootprintRecord>;
+@group(0) @binding(2) var<storage, read> links: array<u32>;
+// For each photon of the batch how many records come before its own.
+@group(0) @binding(3) var<storage, read> starts: array<u32>;
+@group(0) @binding(4) var<storage, read_write> paths: array<u32>;
+@group(0) @binding(6) var<storage, read_write> records: array<FootprintRecord>;
+
+// The first record of a photon that took this path, if there is one.
+fn landed(photon: u32, path: u32) -> Landed {
+    var found = 0u;
+    if photon != NO_PHOTON {
+        // From the last to the first.
+        var place = links[slot_of(photon)];
+        while place != 0u {
+            let link = trace.first_link + 2u * (place - 1u);
+            found = select(found, place, links[link + 1u] == path);
+            place = links[link] & LINK_PLACE;
+        }
+    }
+    var result: Landed;
+    result.is_there = found != 0u;
+    if result.is_there {
+        result.position = appended[found - 1u].position;
+        result.object = appended[found - 1u].object;
+    }
+    return result;
+}
+
+fn order_photon(photon: u32) {
+    let slot = slot_of(photon);
+    var place = links[slot];
+    if place == 0u {
+        return;
+    }
+    let checks = (trace.flags & FLAG_CHECKS) != 0u;
+    var beside: array<vec2<u32>, 2>;
+    if checks {
+        beside = neighbours_of(emitter_of(photon), photon);
+    }
+    var ordered = starts[slot + 1u];
+    while place != 0u {
+        ordered -= 1u;
+        var record = appended[place - 1u];
+        let link = trace.first_link + 2u * (place - 1u);
+        let before = links[link];
+        let path = links[link + 1u];
+        if checks && (before & LINK_THINNED) == 0u {
+            let along = checked_axis(
+                record, record.axis_u, landed(beside[0].x, path), landed(beside[0].y, path));
+            let across = checked_axis(
+                record, record.axis_v, landed(beside[1].x, path), landed(beside[1].y, path));
+            record.position = record.position + along.shift;
+            record.position = record.position + across.shift;
+            record.axis_u = along.axis;
+            record.axis_v = across.axis;
+            count_up(COUNTER_REPLACED, select(0u, 1u, along.is_replaced || across.is_replaced));
+        }
+        records[ordered] = record;
+        paths[ordered] = path;
+        place = before & LINK_PLACE;
+    }
+}
+
+@compute @workgroup_size(ORDER_WORKGROUP_SIZE)
+fn order_photons(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    let index = (group.y * groups.x + group.x) * ORDER_WORKGROUP_SIZE + invocation;
+    if index < trace.count {
+        order_photon(trace.first + index);
+    }
+    workgroupBarrier();
+    publish_ledger(invocation, ORDER_WORKGROUP_SIZE);
+}
