@@ -11,7 +11,9 @@ use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
 use crate::splat::{Receivers, Splat};
 use crate::splat_options::SplatOptions;
-use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SplatScratch};
+use crate::splat_scratch::{
+    DENSITY_BYTES, FootprintBatch, SPLATS_PER_FOOTPRINT, SplatScratch,
+};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::levels;
 use crate::trace_plan::TracePlan;
@@ -431,7 +433,8 @@ fn footprints_per_batch(limits: &wgpu::Limits) -> u32 {
     let bytes = limits
         .max_storage_buffer_binding_size
         .min(limits.max_buffer_size);
-    let each = (size_of::<FootprintRecord>() as u64).max(DENSITY_BYTES);
-    let dispatched = 256 * u64::from(limits.max_compute_workgroups_per_dimension);
+    let densities = DENSITY_BYTES * u64::from(SPLATS_PER_FOOTPRINT);
+    let each = (size_of::<FootprintRecord>() as u64).max(densities);
+    let dispatched = 128 * u64::from(limits.max_compute_workgroups_per_dimension);
     u32::try_from((bytes / each).min(dispatched)).unwrap_or(u32::MAX)
 }

@@ -5,10 +5,13 @@ use crate::splat_view::LEVELS;
 use crate::{FootprintRecord, GpuError, PhotonBuffers};
 
 /// Bytes of a `StoredDensity` of `shaders/density.wgsl`.
-pub(crate) const DENSITY_BYTES: u64 = 64;
+pub(crate) const DENSITY_BYTES: u64 = 80;
 
 /// Bytes of a `SplatPlace` of `shaders/splat_place.wgsl`.
-const PLACE_BYTES: u64 = 40;
+pub(crate) const PLACE_BYTES: u64 = 40;
+
+/// Splats that a footprint may become: its own, and what other surfaces catch of it before its plane.
+pub(crate) const SPLATS_PER_FOOTPRINT: u32 = 2;
 
 /// Footprints that one workgroup prepares.
 pub(crate) const GROUP: u32 = 256;
@@ -47,7 +50,8 @@ impl SplatScratch {
             }
             Ok(storage_buffer(device, what, bytes, usage))
         };
-        let (count, tiles_bytes) = (u64::from(capacity), 4 * u64::from(tiles + 1));
+        let count = u64::from(capacity) * u64::from(SPLATS_PER_FOOTPRINT);
+        let tiles_bytes = 4 * u64::from(tiles + 1);
         let none = wgpu::BufferUsages::empty();
         Ok(Self {
             capacity,
@@ -80,7 +84,7 @@ impl SplatScratch {
             crate::SplatMethod::Tiles => {
                 u64::from(capacity.max(4096)) * u64::from(options.pairs_per_footprint)
             }
-            crate::SplatMethod::Quads => u64::from(capacity),
+            crate::SplatMethod::Quads => u64::from(capacity) * u64::from(SPLATS_PER_FOOTPRINT),
         }
     }
 }

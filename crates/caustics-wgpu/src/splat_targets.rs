@@ -3,7 +3,8 @@ use glam::UVec2;
 use crate::error_scope::{filled_buffer, storage_buffer};
 use crate::renderer_error::RendererError;
 use crate::splat_stats::SplatStats;
-use crate::splat_view::{LEVELS, levels, padded};
+use crate::splat_view::{LEVELS, SURROUNDING_BYTES, SurroundingLevels, levels, padded};
+use crate::GpuError;
 
 /// The textures of one view, for as long as its size stays.
 #[derive(Clone, Debug)]
@@ -22,6 +23,8 @@ pub(crate) struct SplatTargets {
     /// For each level: its own and all coarser ones.
     pub(crate) totals: Vec<wgpu::TextureView>,
     pub(crate) irradiance: wgpu::Texture,
+    /// What tiles of the view show.
+    pub(crate) surroundings: wgpu::Buffer,
     pub(crate) counts: wgpu::Buffer,
     pub(crate) scale: wgpu::Buffer,
 }
@@ -52,6 +55,13 @@ impl SplatTargets {
     ) -> Result<Self, RendererError> {
         let (levels, tiles) = levels(size, device.limits().max_texture_dimension_2d)?;
         let padded = padded(size);
+        let tiles_shown = SurroundingLevels::of(size).tiles;
+        let bytes = u64::from(tiles_shown) * SURROUNDING_BYTES;
+        let limit = device.limits().max_storage_buffer_binding_size;
+        if bytes > limit {
+            let what = "what the tiles of a view show";
+            return Err(GpuError::BufferTooLarge { what, bytes, limit }.into());
+        }
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
         let make = |label, size: UVec2, mips, layers, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
@@ -135,6 +145,12 @@ impl SplatTargets {
             }),
             totals,
             irradiance,
+            surroundings: storage_buffer(
+                device,
+                "caustics surroundings",
+                bytes,
+                wgpu::BufferUsages::empty(),
+            ),
             counts: storage_buffer(
                 device,
                 "caustics counts",

@@ -27,13 +27,7 @@ fn assert_parity(
     for name in names {
         let stage = Stage::load(name, 20_000)?;
         let picture = stage.picture(&stage.camera, SIZE);
-        let expected = stage.splat(
-            &picture,
-            &FootprintOptions {
-                integrate_pixels: false,
-                ..FootprintOptions::default()
-            },
-        )?;
+        let expected = stage.splat(&picture, &FootprintOptions::default())?;
         let (found, stats) =
             irradiance(&device, &queue, &with(splat), &picture, &[&stage.photons])?;
         let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
@@ -46,12 +40,17 @@ fn assert_parity(
     Ok(())
 }
 
-const NAMES: [&str; 5] = [
+const NAMES: [&str; 10] = [
     "p01_sphere",
+    "p02_sphere_box",
     "p03_cognac",
+    "p04_sphere_in_box",
     "p05_brass_ring",
+    "p06_wave_plane",
     "p07_pool",
+    "p08_square",
     "p09_cornell",
+    "p10_torus_cube",
 ];
 
 #[test]
@@ -90,7 +89,6 @@ fn every_kernel_draws_the_picture_of_the_cpu() -> Result<(), TestError> {
                 kernel: twin,
                 scale,
                 max_anisotropy,
-                integrate_pixels: false,
                 ..FootprintOptions::default()
             };
             let expected = stage.splat(&picture, &options)?;
