@@ -11,9 +11,7 @@ use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
 use crate::splat::{Receivers, Splat};
 use crate::splat_options::SplatOptions;
-use crate::splat_scratch::{
-    DENSITY_BYTES, FootprintBatch, SPLATS_PER_FOOTPRINT, SplatScratch,
-};
+use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SPLATS_PER_FOOTPRINT, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::levels;
 use crate::trace_plan::TracePlan;

@@ -1,10 +1,10 @@
 use glam::UVec2;
 
+use crate::GpuError;
 use crate::error_scope::{filled_buffer, storage_buffer};
 use crate::renderer_error::RendererError;
 use crate::splat_stats::SplatStats;
 use crate::splat_view::{LEVELS, SURROUNDING_BYTES, SurroundingLevels, levels, padded};
-use crate::GpuError;
 
 /// The textures of one view, for as long as its size stays.
 #[derive(Clone, Debug)]
