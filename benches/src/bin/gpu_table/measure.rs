@@ -232,8 +232,14 @@ impl Bench {
             };
             gpu.run(|encoder| Ok(renderer.prepare(&gpu.device, &gpu.queue, encoder, &frame)?))
         };
-        // The first run makes buffers and translates shaders.
-        draw(&all)?;
+        let nothing = gpu.buffer(&[0u32; 4]);
+        let none = [FootprintBatch {
+            records: &nothing,
+            count: &nothing,
+        }];
+        // The first run makes textures and translates shaders.
+        draw(&none)?;
+        let empty = median_of(self.patience, || draw(&none))?.seconds;
         let frame = median_of(self.patience, || draw(&all))?;
         let seconds = frame.seconds;
         let frame = frame.value;
@@ -243,12 +249,6 @@ impl Bench {
         if stats.dropped_pairs > 0 {
             eprintln!("{}: {} pairs dropped", stage.name, stats.dropped_pairs);
         }
-        let nothing = gpu.buffer(&[0u32; 4]);
-        let none = [FootprintBatch {
-            records: &nothing,
-            count: &nothing,
-        }];
-        let empty = median_of(self.patience, || draw(&none))?.seconds;
         let radiance = receivers
             .albedo
             .iter()
