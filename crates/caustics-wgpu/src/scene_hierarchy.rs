@@ -1,4 +1,8 @@
 //! The binary hierarchy that the shaders traverse.
+//!
+//! Binary, because its boxes are fitted anew in shaders, row by row, and because a node is two aligned
+//! loads. That is a choice of design: in shaders no wide or compressed layout was measured against it.
+//! On the CPU, where this workspace did measure, an eight-wide tree is the faster one.
 
 use std::ops::Range;
 

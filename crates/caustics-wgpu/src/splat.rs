@@ -452,9 +452,8 @@ fn sum_format(device: &wgpu::Device, options: &SplatOptions) -> SumFormat {
             is_blended: true,
         },
         method => SumFormat {
-            format: wgpu::TextureFormat::Rgba32Float,
-            layers: 1,
             is_blended: method == SplatMethod::Quads,
+            ..SumFormat::WRITTEN
         },
     }
 }

@@ -81,12 +81,7 @@ fn quads_in_half_floats_draw_the_picture_of_the_cpu() -> Result<(), TestError> {
         method: SplatMethod::Quads,
         ..SplatOptions::default()
     };
-    assert_parity(
-        wgpu::Features::empty(),
-        quads,
-        &NAMES,
-        OFF_IN_HALF_FLOATS,
-    )
+    assert_parity(wgpu::Features::empty(), quads, &NAMES, OFF_IN_HALF_FLOATS)
 }
 
 /// The stage's camera, as near to the floor as a cat's eyes.
@@ -125,7 +120,10 @@ fn planes_seen_edge_on_and_what_stands_before_them_are_lit_as_on_the_cpu() -> Re
                 irradiance(&device, &queue, &with(splat), &picture, &[&stage.photons])?;
             let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
             println!("{name}: off by {off:.2e}, {wrong:.2e} of the pixels, {stats:?}");
-            assert!(off < 5e-3, "{name}: {off}, {wrong} of the pixels, {stats:?}");
+            assert!(
+                off < 5e-3,
+                "{name}: {off}, {wrong} of the pixels, {stats:?}"
+            );
         }
     }
     Ok(())
