@@ -24,6 +24,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         arguments,
         lines: Vec::new(),
         is_text_hidden: false,
+        is_light_moved: false,
         open: None,
         failure: None,
         held: None,
@@ -40,6 +41,8 @@ struct Viewer {
     /// What is shown of the frame before.
     lines: Vec<String>,
     is_text_hidden: bool,
+    /// Whether the light has moved since it was aimed: the mouse tells more often than frames come.
+    is_light_moved: bool,
     open: Option<OpenWindow>,
     failure: Option<Failure>,
     held: Option<MouseButton>,
@@ -110,6 +113,9 @@ impl OpenWindow {
 
 impl Viewer {
     fn draw(&mut self) -> Result<(), Failure> {
+        if std::mem::take(&mut self.is_light_moved) {
+            self.aim()?;
+        }
         let Some(open) = &mut self.open else {
             return Ok(());
         };
@@ -248,17 +254,16 @@ impl Viewer {
         self.set_splat()
     }
 
-    fn drag(&mut self, x: f32, y: f32) -> Result<(), Failure> {
+    fn drag(&mut self, x: f32, y: f32) {
         let [from_x, from_y] = std::mem::replace(&mut self.pointer, [x, y]);
         match self.held {
             Some(MouseButton::Left) => self.orbit.turn(x - from_x, y - from_y),
             Some(MouseButton::Right) => {
                 self.orbit.drag_light(x - from_x, y - from_y);
-                return self.aim();
+                self.is_light_moved = true;
             }
             _ => {}
         }
-        Ok(())
     }
 
     fn handle(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) -> Result<(), Failure> {
@@ -276,7 +281,7 @@ impl Viewer {
                 self.held = (state == ElementState::Pressed).then_some(button);
             }
             WindowEvent::CursorMoved { position, .. } => {
-                self.drag(position.x as f32, position.y as f32)?;
+                self.drag(position.x as f32, position.y as f32);
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let lines = match delta {
