@@ -328,8 +328,8 @@ impl Bench {
 fn points(receivers: &Receivers) -> Vec<GatherPoint> {
     let width = receivers.size[0] as usize;
     let is_asked = |pixel: &usize| {
-        pixel % width % GATHER_STRIDE == 0
-            && pixel / width % GATHER_STRIDE == 0
+        (pixel % width).is_multiple_of(GATHER_STRIDE)
+            && (pixel / width).is_multiple_of(GATHER_STRIDE)
             && receivers.points[*pixel][1] != [0.0; 3]
     };
     let asked = (0..receivers.points.len()).filter(is_asked);
