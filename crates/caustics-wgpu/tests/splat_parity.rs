@@ -121,7 +121,7 @@ fn planes_seen_edge_on_and_what_stands_before_them_are_lit_as_on_the_cpu() -> Re
             let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
             println!("{name}: off by {off:.2e}, {wrong:.2e} of the pixels, {stats:?}");
             assert!(
-                off < 5e-3,
+                off < OFF,
                 "{name}: {off}, {wrong} of the pixels, {stats:?}"
             );
         }
