@@ -120,10 +120,7 @@ fn planes_seen_edge_on_and_what_stands_before_them_are_lit_as_on_the_cpu() -> Re
                 irradiance(&device, &queue, &with(splat), &picture, &[&stage.photons])?;
             let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
             println!("{name}: off by {off:.2e}, {wrong:.2e} of the pixels, {stats:?}");
-            assert!(
-                off < OFF,
-                "{name}: {off}, {wrong} of the pixels, {stats:?}"
-            );
+            assert!(off < OFF, "{name}: {off}, {wrong} of the pixels, {stats:?}");
         }
     }
     Ok(())
