@@ -4,6 +4,7 @@ pub mod conditions;
 pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
+pub mod flip;
 pub mod meshes;
 pub mod peers;
 pub mod photons;

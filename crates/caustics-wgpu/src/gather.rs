@@ -13,6 +13,7 @@ use crate::{FootprintRecord, GpuError};
 const BUILD: Shader = Shader {
     label: "gather_build",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         FOOTPRINT_RECORD,
         shader_piece!("gather_grid"),
@@ -23,6 +24,7 @@ const BUILD: Shader = Shader {
 const POINTS: Shader = Shader {
     label: "gather_points",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("gather_grid"),
         shader_piece!("gather_lookup"),
@@ -34,6 +36,7 @@ const POINTS: Shader = Shader {
 const LOOKUP: Shader = Shader {
     label: "gather_lookup",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("gather_grid"),
         shader_piece!("gather_lookup"),
@@ -74,8 +77,9 @@ pub struct GatherPoint {
     pub pad_a: f32,
     /// Unit normal on the side that is lit.
     pub normal: [f32; 3],
-    /// Not used.
-    pub pad_b: f32,
+    /// Index of its object among the world's, plus one: light stays off what stands close to its
+    /// receiver. 0 where the object is not known.
+    pub object_plus_one: u32,
 }
 
 /// How a [`Gather`] is made.
@@ -292,9 +296,10 @@ impl Gather {
         })
     }
 
-    /// WGSL to put before a shader of the host's. It declares `caustics_irradiance` and, besides,
-    /// names that begin with `caustics_`, `gather_`, `density_`, `kernel_` and `covariance_`, and
-    /// those in `shaders/density.wgsl`; its bindings are `first` to `first + 4` of `group`: a
+    /// WGSL to put before a shader of the host's. It declares `caustics_irradiance`, and
+    /// `caustics_irradiance_on` for points whose object is known. Besides, it declares names that
+    /// begin with `caustics_`, `gather_`, `gate_`, `density_`, `kernel_` and `covariance_`, and those
+    /// in `shaders/gate.wgsl` and `shaders/density.wgsl`; its bindings are `first` to `first + 4` of `group`: a
     /// uniform buffer, then four read-only storage buffers, as [`bindings`](Self::bindings) gives
     /// them. The host's pipeline sets the constant that [`constant`](Self::constant) names.
     ///
@@ -507,7 +512,7 @@ mod tests {
                 position,
                 pad_a,
                 normal,
-                pad_b
+                object_plus_one
             }
         );
     }

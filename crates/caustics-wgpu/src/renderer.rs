@@ -11,7 +11,7 @@ use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
 use crate::splat::{Receivers, Splat};
 use crate::splat_options::SplatOptions;
-use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SplatScratch};
+use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SPLATS_PER_FOOTPRINT, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::levels;
 use crate::trace_plan::TracePlan;
@@ -32,6 +32,10 @@ pub struct RendererOptions {
     /// refracts, and stores two to four in common scenes. What has no room is counted as crowded
     /// by [`TraceCounters`](crate::TraceCounters).
     pub records_per_photon: u32,
+    /// Whether scenes with glossy receivers may be traced. What is summed is irradiance, which says
+    /// all of a matt receiver's light but not where a glossy one reflects it to: as if it were matt.
+    /// Else such a scene is refused.
+    pub glossy_as_matt: bool,
 }
 
 impl Default for RendererOptions {
@@ -41,6 +45,7 @@ impl Default for RendererOptions {
             targets: Vec::new(),
             times_passes: false,
             records_per_photon: 4,
+            glossy_as_matt: false,
         }
     }
 }
@@ -81,6 +86,7 @@ pub struct CausticsRenderer {
     composite: CompositePass,
     tracer: Option<PhotonTracer>,
     records_per_photon: u32,
+    glossy_as_matt: bool,
     photons: Vec<PhotonBuffers>,
     views: Vec<SplatTargets>,
     scratch: Option<SplatScratch>,
@@ -155,6 +161,7 @@ impl CausticsRenderer {
                 splat,
                 tracer: None,
                 records_per_photon: options.records_per_photon,
+                glossy_as_matt: options.glossy_as_matt,
                 photons: Vec::new(),
                 views: Vec::new(),
                 scratch: None,
@@ -188,7 +195,10 @@ impl CausticsRenderer {
     /// those of the frame that was prepared last: draw each before the next is prepared.
     ///
     /// # Errors
-    /// A view's size or projection out of range, more footprints in a batch than the device binds,
+    /// A traced scene with glossy receivers, unless
+    /// [`glossy_as_matt`](RendererOptions::glossy_as_matt) allows them
+    /// ([`GpuError::Unsupported`]); a view's size or projection out of range, more footprints in a
+    /// batch than the device binds,
     /// a texture of the host's that does not fit its use, or a device that is lost or out of
     /// memory. Then nothing of the frame can be drawn, but the renderer stays as it was.
     pub fn prepare(
@@ -198,6 +208,13 @@ impl CausticsRenderer {
         encoder: &mut wgpu::CommandEncoder,
         frame: &FrameParams<'_>,
     ) -> Result<PreparedFrame, RendererError> {
+        if let FrameLight::Traced { scene, .. } = frame.light
+            && scene.is_glossy
+            && !self.glossy_as_matt
+        {
+            let what = "light that glossy receivers reflect";
+            return Err(GpuError::Unsupported { what }.into());
+        }
         let max_texture = device.limits().max_texture_dimension_2d;
         let options = *self.splat.options();
         let uniforms = (0..)
@@ -303,9 +320,7 @@ impl CausticsRenderer {
 
     /// Makes room for the landings of so many photons, in as few batches as bindings allow.
     fn fit_photons(&mut self, device: &wgpu::Device, photons: u32) -> Result<(), RendererError> {
-        let most = footprints_per_batch(&device.limits());
-        let batch = (most / self.records_per_photon).clamp(1, photons.max(1));
-        let count = photons.div_ceil(batch).max(1);
+        let (batch, count) = photon_batches(&device.limits(), self.records_per_photon, photons);
         let room: u32 = self.photons.iter().map(PhotonBuffers::photons).sum();
         let is_right = self.photons.len() == count as usize
             && self.photons.iter().all(|it| it.photons() <= batch)
@@ -426,12 +441,57 @@ impl PreparedFrame {
     }
 }
 
+/// In how many batches so many photons are traced, and the photons of each.
+fn photon_batches(limits: &wgpu::Limits, records_per_photon: u32, photons: u32) -> (u32, u32) {
+    let most = footprints_per_batch(limits);
+    let batch = (most / records_per_photon).clamp(1, photons.max(1));
+    (batch, photons.div_ceil(batch).max(1))
+}
+
 /// Footprints whose records and densities one binding holds, and one dispatch reaches.
 fn footprints_per_batch(limits: &wgpu::Limits) -> u32 {
     let bytes = limits
         .max_storage_buffer_binding_size
         .min(limits.max_buffer_size);
-    let each = (size_of::<FootprintRecord>() as u64).max(DENSITY_BYTES);
-    let dispatched = 256 * u64::from(limits.max_compute_workgroups_per_dimension);
+    let densities = DENSITY_BYTES * u64::from(SPLATS_PER_FOOTPRINT);
+    let each = (size_of::<FootprintRecord>() as u64).max(densities);
+    let dispatched = 128 * u64::from(limits.max_compute_workgroups_per_dimension);
     u32::try_from((bytes / each).min(dispatched)).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::splat_scratch::SplatSizes;
+
+    #[test]
+    fn two_million_photons_fit_bindings_of_128_mib() {
+        let limits = wgpu::Limits::default();
+        assert_eq!(limits.max_storage_buffer_binding_size, 128 << 20);
+        let records_per_photon = RendererOptions::default().records_per_photon;
+        let photons = 2_000_000;
+        let (batch, count) = photon_batches(&limits, records_per_photon, photons);
+        assert!(u64::from(batch) * u64::from(count) >= u64::from(photons));
+        assert_eq!(count, 10);
+        let capacity = batch * records_per_photon;
+        assert!(capacity <= footprints_per_batch(&limits));
+        let records = u64::from(capacity) * size_of::<FootprintRecord>() as u64;
+        let (_, tiles) = levels(UVec2::new(3840, 2160), limits.max_texture_dimension_2d).unwrap();
+        for method in [crate::SplatMethod::Tiles, crate::SplatMethod::Quads] {
+            let options = SplatOptions {
+                method,
+                ..SplatOptions::default()
+            };
+            let pairs = SplatScratch::pairs(&options, capacity);
+            let sizes = SplatSizes::of(capacity, tiles, pairs, 8).all();
+            for bytes in sizes.into_iter().chain([records]) {
+                assert!(bytes <= limits.max_storage_buffer_binding_size, "{bytes}");
+            }
+        }
+        // The largest batch is as large as can be: one footprint more would not fit.
+        let most = footprints_per_batch(&limits);
+        let densities = |capacity| SplatSizes::of(capacity, 0, 0, 1).densities;
+        assert!(densities(most) <= limits.max_storage_buffer_binding_size);
+        assert!(densities(most + 1) > limits.max_storage_buffer_binding_size);
+    }
 }

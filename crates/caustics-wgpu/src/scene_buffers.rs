@@ -32,6 +32,8 @@ pub struct SceneBuffers {
     /// By how much each leaf's box is wider than what it holds, in metres.
     pub(crate) margin: f32,
     pub(crate) counts: SceneCounts,
+    /// Whether any receiver is glossy.
+    pub(crate) is_glossy: bool,
     bytes: u64,
 }
 
@@ -81,6 +83,7 @@ impl SceneBuffers {
                 triangles: packed.triangles.len(),
                 bodies: packed.bodies.len(),
             },
+            is_glossy: is_glossy(world),
             bytes,
         })
     }
@@ -106,6 +109,14 @@ impl SceneBuffers {
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
+}
+
+/// Whether any object of the world is glossy.
+fn is_glossy(world: &World) -> bool {
+    world.objects().iter().any(|object| {
+        let surface = &world.materials()[object.material as usize].surface;
+        surface.brdf().is_some_and(|brdf| !brdf.is_lambertian())
+    })
 }
 
 /// A storage buffer of these elements, or of one that is never read where there are none.
@@ -139,4 +150,43 @@ pub(crate) fn fits(device: &wgpu::Device, what: &'static str, bytes: u64) -> Res
         return Err(GpuError::BufferTooLarge { what, bytes, limit });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use caustics_geometry::shapes::icosphere;
+    use caustics_scene::{Instance, Material, Scene, Shape};
+
+    #[test]
+    fn half_a_million_triangles_fit_bindings_of_128_mib() {
+        let mut scene = Scene::new();
+        let mesh = scene.add_mesh(icosphere(1.0, 3).unwrap());
+        let glass = scene
+            .add_material(Material::dielectric("glass", 1.5))
+            .unwrap();
+        let ball = Instance::new("ball", Shape::Mesh(mesh), glass);
+        scene.add_instance(ball).unwrap();
+        let world = World::new(&scene).unwrap();
+        let packed = PackedScene::new(&world).unwrap();
+        let hierarchy = SceneHierarchy::new(&world, &BodyOrder::new(&world).unwrap());
+        let triangles = world.triangles().len();
+        assert_eq!(packed.triangles.len(), triangles);
+        assert_eq!(hierarchy.nodes.len(), 2 * triangles - 1);
+        assert!(packed.vertices.len() <= 3 * triangles);
+        assert_eq!(hierarchy.refit_order().0.len(), hierarchy.nodes.len());
+
+        let limit = wgpu::Limits::default().max_storage_buffer_binding_size;
+        let bytes = |triangles: u64| {
+            [
+                (2 * triangles - 1) * size_of::<Node>() as u64,
+                // Even if none is shared.
+                3 * triangles * size_of::<Vertex>() as u64,
+                triangles * size_of::<Triangle>() as u64,
+                (2 * triangles - 1) * size_of::<u32>() as u64,
+            ]
+        };
+        assert!(bytes(500_000).iter().all(|&it| it <= limit));
+        assert!(bytes(2_000_000)[0] <= limit && bytes(2_200_000)[0] > limit);
+    }
 }

@@ -8,14 +8,19 @@ use crate::splat_quads::SplatQuads;
 use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_tiles::SplatTiles;
-use crate::splat_view::{LEVELS, ROUNDS, SplatStep};
+use crate::splat_view::{LEVELS, ROUNDS, SURROUNDING_TILE, SplatStep};
 
 const PREPARE: Shader = Shader {
     label: "splat_prepare",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         FOOTPRINT_RECORD,
         shader_piece!("splat_view"),
+        shader_piece!("screen"),
+        shader_piece!("pixel_integral"),
+        shader_piece!("surroundings"),
+        shader_piece!("splat_reach"),
         shader_piece!("splat_place"),
         shader_piece!("splat_prepare"),
     ],
@@ -24,6 +29,7 @@ const PREPARE: Shader = Shader {
 const TEXELS: Shader = Shader {
     label: "splat_texels",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
         shader_piece!("splat_texels"),
@@ -33,8 +39,10 @@ const TEXELS: Shader = Shader {
 const COARSEN: Shader = Shader {
     label: "splat_coarsen",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
+        shader_piece!("screen"),
         shader_piece!("splat_coarsen"),
     ],
 };
@@ -42,10 +50,22 @@ const COARSEN: Shader = Shader {
 const UPSAMPLE: Shader = Shader {
     label: "splat_upsample",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
         shader_piece!("splat_scale"),
         shader_piece!("splat_upsample"),
+    ],
+};
+
+const SURROUNDINGS: Shader = Shader {
+    label: "splat_surroundings",
+    pieces: &[
+        shader_piece!("gate"),
+        shader_piece!("density"),
+        shader_piece!("splat_view"),
+        shader_piece!("surroundings"),
+        shader_piece!("splat_surroundings"),
     ],
 };
 
@@ -59,6 +79,7 @@ pub(crate) struct Splat {
     format: SumFormat,
     texels: (PassLayout, wgpu::ComputePipeline),
     coarsen: (PassLayout, wgpu::ComputePipeline),
+    surroundings: (PassLayout, [wgpu::ComputePipeline; 2]),
     prepare: (PassLayout, wgpu::ComputePipeline),
     upsample: (PassLayout, wgpu::ComputePipeline),
     way: Way,
@@ -157,7 +178,15 @@ impl Splat {
             Slot::Write,
             Slot::Write,
             Slot::Write,
+            Slot::Read,
         ];
+        let surroundings = [
+            Slot::Uniform,
+            Slot::UintTexture,
+            Slot::UintTexture,
+            Slot::Write,
+        ];
+        let surroundings = PassLayout::new(device, SURROUNDINGS.label, stages, &surroundings);
         let upsample = [
             Slot::Uniform,
             Slot::Uniform,
@@ -185,6 +214,11 @@ impl Splat {
             format,
             texels: make(&TEXELS, &texels),
             coarsen: make(&COARSEN, &coarsen),
+            surroundings: {
+                let make = |entry| surroundings.compute(device, &SURROUNDINGS, entry, &kernel);
+                let both = ["splat_surroundings", "splat_surroundings_coarser"].map(make);
+                (surroundings, both)
+            },
             prepare: make(&PREPARE, &prepare),
             upsample: make(&UPSAMPLE, &upsample),
             way: match options.method {
@@ -311,6 +345,28 @@ impl Splat {
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
         }
+        drop(pass);
+        let (layout, [finest, coarser]) = &self.surroundings;
+        let group = layout.bind(
+            device,
+            &[
+                view.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&targets.texels[0]),
+                wgpu::BindingResource::TextureView(&targets.objects[0]),
+                targets.surroundings.as_entire_binding(),
+            ],
+        );
+        let mut pass = recorder.compute("splat_surroundings", 2);
+        let [width, height] = [targets.levels[0][0], targets.levels[0][1]];
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(finest);
+        pass.dispatch_workgroups(
+            width.div_ceil(SURROUNDING_TILE),
+            height.div_ceil(SURROUNDING_TILE),
+            1,
+        );
+        pass.set_pipeline(coarser);
+        pass.dispatch_workgroups(1, 1, 1);
     }
 
     fn record_prepare(
@@ -323,11 +379,11 @@ impl Splat {
         batch: &FootprintBatch<'_>,
     ) {
         let (layout, pipeline) = &self.prepare;
-        // The counts by level are those of a batch.
-        let by_level = std::mem::offset_of!(crate::splat_stats::SplatCounts, by_level) as u64;
+        // From here on the counts are those of a batch.
+        let of_batch = std::mem::offset_of!(crate::splat_stats::SplatCounts, footprints) as u64;
         recorder
             .encoder
-            .clear_buffer(&targets.counts, by_level, None);
+            .clear_buffer(&targets.counts, of_batch, None);
         let group = layout.bind(
             device,
             &[
@@ -338,6 +394,7 @@ impl Splat {
                 scratch.places.as_entire_binding(),
                 targets.counts.as_entire_binding(),
                 scratch.peak_sums.as_entire_binding(),
+                targets.surroundings.as_entire_binding(),
             ],
         );
         let mut pass = recorder.compute("splat_prepare", 1);
@@ -395,9 +452,8 @@ fn sum_format(device: &wgpu::Device, options: &SplatOptions) -> SumFormat {
             is_blended: true,
         },
         method => SumFormat {
-            format: wgpu::TextureFormat::Rgba32Float,
-            layers: 1,
             is_blended: method == SplatMethod::Quads,
+            ..SumFormat::WRITTEN
         },
     }
 }
@@ -406,12 +462,13 @@ fn sum_format(device: &wgpu::Device, options: &SplatOptions) -> SumFormat {
 mod tests {
     use super::*;
     use crate::shader::{assert_layout, reflection};
+    use crate::splat_scratch::{DENSITY_BYTES, PLACE_BYTES};
     use crate::splat_stats::SplatCounts;
-    use crate::splat_view::SplatView;
+    use crate::splat_view::{SURROUNDING_BYTES, SplatView};
 
     #[test]
     fn the_shaders_are_valid() {
-        for shader in [&PREPARE, &TEXELS, &COARSEN, &UPSAMPLE] {
+        for shader in [&PREPARE, &TEXELS, &COARSEN, &UPSAMPLE, &SURROUNDINGS] {
             let valid = reflection::validated(shader);
             assert!(valid.is_ok(), "{}", valid.unwrap_err());
         }
@@ -433,7 +490,12 @@ mod tests {
                 scale,
                 max_anisotropy,
                 has_objects,
+                integrate_pixels,
+                surrounding_levels,
+                pad_a,
+                pad_b,
                 levels,
+                surroundings,
             }
         );
         assert_layout!(
@@ -450,17 +512,22 @@ mod tests {
             SplatCounts {
                 splatted,
                 outside,
+                hidden,
                 turned_away,
                 invalid,
                 pairs,
                 dropped_pairs,
                 footprints,
+                caught,
                 pad,
                 by_level,
                 level_cursor,
             }
         );
-        let sizes = ["StoredDensity", "SplatPlace"].map(|it| reflection::layout(&module, it).1);
-        assert_eq!(sizes, [64, 40]);
+        let sizes = ["StoredDensity", "SplatPlace", "SurroundingTile"]
+            .map(|it| u64::from(reflection::layout(&module, it).1));
+        assert_eq!(sizes, [DENSITY_BYTES, PLACE_BYTES, SURROUNDING_BYTES]);
+        let tile = reflection::constant(&module, "SURROUNDING_TILE");
+        assert_eq!(tile, SURROUNDING_TILE);
     }
 }

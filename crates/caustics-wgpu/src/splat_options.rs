@@ -50,6 +50,10 @@ pub struct SplatOptions {
     /// The longer axis may be at most this many times the shorter one, which is widened; at least
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
+    /// Whether Gaussian footprints as small as pixels are integrated over each pixel; if not, they
+    /// are blurred by the pixel and read at its middle, which lets a bright line leak some percent
+    /// into the pixels beside it.
+    pub integrate_pixels: bool,
     /// Room for pairs of a footprint and a tile that it touches, for each footprint that a batch
     /// has room for: 2 to 64. Tiles whose pairs do not fit together are summed in up to four rounds;
     /// pairs without room even then are counted in
@@ -70,6 +74,7 @@ impl Default for SplatOptions {
             kernel: SplatKernel::default(),
             scale: 0.55,
             max_anisotropy: f32::INFINITY,
+            integrate_pixels: true,
             pairs_per_footprint: 8,
             half_float_layers: 8,
             prefer_half_floats: false,
@@ -115,6 +120,11 @@ impl SplatOptions {
             }
             None => Ok(()),
         }
+    }
+
+    /// Whether any footprints are integrated.
+    pub(crate) fn integrates_pixels(&self) -> bool {
+        self.integrate_pixels && self.kernel == SplatKernel::Gaussian
     }
 
     /// The limit as shaders know it, which need not know infinity.

@@ -7,15 +7,17 @@ use crate::renderer_error::RendererError;
 use crate::shader::{Shader, shader_piece};
 use crate::splat::SplatSteps;
 use crate::splat_options::SplatOptions;
-use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
+use crate::splat_scratch::{FootprintBatch, GROUP, SPLATS_PER_FOOTPRINT, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::LEVELS;
 
 const ORDER: Shader = Shader {
     label: "splat_order",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
+        shader_piece!("pixel_integral"),
         shader_piece!("splat_place"),
         shader_piece!("splat_scale"),
         shader_piece!("splat_order"),
@@ -25,8 +27,10 @@ const ORDER: Shader = Shader {
 const QUADS: Shader = Shader {
     label: "splat_quads",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
+        shader_piece!("pixel_integral"),
         shader_piece!("splat_place"),
         shader_piece!("splat_scale"),
         shader_piece!("splat_quads"),
@@ -101,6 +105,7 @@ impl SplatQuads {
             Slot::UintTexture,
             Slot::Read,
             Slot::Texture,
+            Slot::UintTexture,
         ];
         let quads = PassLayout::new(
             device,
@@ -219,7 +224,8 @@ impl SplatQuads {
         let mut pass = recorder.compute("splat_order", 2);
         pass.set_bind_group(0, &order, &[]);
         pass.set_pipeline(&self.sort);
-        pass.dispatch_workgroups(batch.capacity().div_ceil(GROUP).max(1), 1, 1);
+        let splats = batch.capacity() * SPLATS_PER_FOOTPRINT;
+        pass.dispatch_workgroups(splats.div_ceil(GROUP).max(1), 1, 1);
         pass.set_pipeline(&self.draws);
         pass.dispatch_workgroups(1, 1, 1);
     }
@@ -300,6 +306,7 @@ impl SplatQuads {
                 wgpu::BindingResource::TextureView(&targets.texels[level]),
                 targets.scale.as_entire_binding(),
                 wgpu::BindingResource::TextureView(estimate.unwrap_or(&self.nothing)),
+                wgpu::BindingResource::TextureView(&targets.objects[level]),
             ],
         )
     }

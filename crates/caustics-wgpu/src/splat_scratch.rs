@@ -5,10 +5,13 @@ use crate::splat_view::LEVELS;
 use crate::{FootprintRecord, GpuError, PhotonBuffers};
 
 /// Bytes of a `StoredDensity` of `shaders/density.wgsl`.
-pub(crate) const DENSITY_BYTES: u64 = 64;
+pub(crate) const DENSITY_BYTES: u64 = 80;
 
 /// Bytes of a `SplatPlace` of `shaders/splat_place.wgsl`.
-const PLACE_BYTES: u64 = 40;
+pub(crate) const PLACE_BYTES: u64 = 40;
+
+/// Splats that a footprint may become: its own, and what other surfaces catch of it before its plane.
+pub(crate) const SPLATS_PER_FOOTPRINT: u32 = 2;
 
 /// Footprints that one workgroup prepares.
 pub(crate) const GROUP: u32 = 256;
@@ -29,6 +32,46 @@ pub(crate) struct SplatScratch {
     pub(crate) draws: wgpu::Buffer,
 }
 
+/// Bytes of the buffers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SplatSizes {
+    pub(crate) densities: u64,
+    places: u64,
+    /// Of the counts, and of the starts.
+    tiles: u64,
+    pairs: u64,
+    peak_sums: u64,
+    draws: u64,
+}
+
+impl SplatSizes {
+    pub(crate) fn of(capacity: u32, tiles: u32, pairs: u64, layers: u32) -> Self {
+        let splats = u64::from(capacity) * u64::from(SPLATS_PER_FOOTPRINT);
+        Self {
+            densities: splats * DENSITY_BYTES,
+            places: splats * PLACE_BYTES,
+            tiles: 4 * u64::from(tiles + 1),
+            pairs: 4 * pairs,
+            peak_sums: 4 * u64::from(capacity.div_ceil(GROUP)),
+            draws: 16 * LEVELS as u64 * u64::from(layers + 1),
+        }
+    }
+
+    /// Each of them.
+    #[cfg(test)]
+    pub(crate) fn all(self) -> [u64; 6] {
+        let Self {
+            densities,
+            places,
+            tiles,
+            pairs,
+            peak_sums,
+            draws,
+        } = self;
+        [densities, places, tiles, pairs, peak_sums, draws]
+    }
+}
+
 impl SplatScratch {
     pub(crate) fn new(
         device: &wgpu::Device,
@@ -41,36 +84,24 @@ impl SplatScratch {
         let limit = limits
             .max_storage_buffer_binding_size
             .min(limits.max_buffer_size);
+        let sizes = SplatSizes::of(capacity, tiles, pairs.min(limit / 4), layers);
         let make = |what: &'static str, bytes: u64, usage| {
             if bytes > limit {
                 return Err(GpuError::BufferTooLarge { what, bytes, limit });
             }
             Ok(storage_buffer(device, what, bytes, usage))
         };
-        let (count, tiles_bytes) = (u64::from(capacity), 4 * u64::from(tiles + 1));
         let none = wgpu::BufferUsages::empty();
         Ok(Self {
             capacity,
             tiles,
-            densities: make("prepared footprints", count * DENSITY_BYTES, none)?,
-            places: make("places of footprints", count * PLACE_BYTES, none)?,
-            tile_counts: make("counts of tiles", tiles_bytes, wgpu::BufferUsages::COPY_DST)?,
-            tile_starts: make("starts of tiles", tiles_bytes, none)?,
-            pairs: make(
-                "pairs of footprints and tiles",
-                4 * pairs.min(limit / 4),
-                none,
-            )?,
-            peak_sums: make(
-                "peaks of footprints",
-                4 * u64::from(capacity.div_ceil(GROUP)),
-                none,
-            )?,
-            draws: make(
-                "draws of quads",
-                16 * LEVELS as u64 * u64::from(layers + 1),
-                wgpu::BufferUsages::INDIRECT,
-            )?,
+            densities: make("prepared footprints", sizes.densities, none)?,
+            places: make("places of footprints", sizes.places, none)?,
+            tile_counts: make("counts of tiles", sizes.tiles, wgpu::BufferUsages::COPY_DST)?,
+            tile_starts: make("starts of tiles", sizes.tiles, none)?,
+            pairs: make("pairs of footprints and tiles", sizes.pairs, none)?,
+            peak_sums: make("peaks of footprints", sizes.peak_sums, none)?,
+            draws: make("draws of quads", sizes.draws, wgpu::BufferUsages::INDIRECT)?,
         })
     }
 
@@ -80,7 +111,7 @@ impl SplatScratch {
             crate::SplatMethod::Tiles => {
                 u64::from(capacity.max(4096)) * u64::from(options.pairs_per_footprint)
             }
-            crate::SplatMethod::Quads => u64::from(capacity),
+            crate::SplatMethod::Quads => u64::from(capacity) * u64::from(SPLATS_PER_FOOTPRINT),
         }
     }
 }
@@ -111,5 +142,25 @@ impl FootprintBatch<'_> {
     pub fn capacity(&self) -> u32 {
         let records = self.records.size() / size_of::<FootprintRecord>() as u64;
         u32::try_from(records).unwrap_or(u32::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn footprints_take_the_memory_that_the_documentation_says() {
+        let options = SplatOptions::default();
+        let capacity = 1 << 20;
+        let pairs = SplatScratch::pairs(&options, capacity);
+        let all: u64 = SplatSizes::of(capacity, 0, pairs, 1).all().iter().sum();
+        let each = all / u64::from(capacity);
+        let told = format!("; and a footprint of the largest batch {each}");
+        let documentation = include_str!("lib.rs").replace("\n//!", "");
+        assert!(documentation.contains(&told), "{told}");
+        let batch = (128 << 20) / (DENSITY_BYTES * u64::from(SPLATS_PER_FOOTPRINT));
+        let told = format!("{:.1} million in 128 MiB", 1e-6 * batch as f64);
+        assert!(documentation.contains(&told), "{told}");
     }
 }

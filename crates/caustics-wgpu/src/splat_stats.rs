@@ -6,11 +6,13 @@ use bytemuck::{Pod, Zeroable};
 pub(crate) struct SplatCounts {
     pub(crate) splatted: u32,
     pub(crate) outside: u32,
+    pub(crate) hidden: u32,
     pub(crate) turned_away: u32,
     pub(crate) invalid: u32,
     pub(crate) pairs: u32,
     pub(crate) dropped_pairs: u32,
     pub(crate) footprints: u32,
+    pub(crate) caught: u32,
     pub(crate) pad: u32,
     pub(crate) by_level: [u32; 8],
     pub(crate) level_cursor: [u32; 8],
@@ -23,6 +25,8 @@ pub struct SplatStats {
     pub splatted: u32,
     /// Footprints that lie outside the picture or behind the camera.
     pub outside: u32,
+    /// Footprints that lie behind something else in the picture.
+    pub hidden: u32,
     /// Footprints on a receiver that shows the camera its other side.
     pub turned_away: u32,
     /// Footprints that are not finite numbers.
@@ -46,6 +50,7 @@ impl SplatStats {
         Some(Self {
             splatted: counts.splatted,
             outside: counts.outside,
+            hidden: counts.hidden,
             turned_away: counts.turned_away,
             invalid: counts.invalid,
             pairs: counts.pairs,

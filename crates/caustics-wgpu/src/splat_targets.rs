@@ -1,9 +1,10 @@
 use glam::UVec2;
 
+use crate::GpuError;
 use crate::error_scope::{filled_buffer, storage_buffer};
 use crate::renderer_error::RendererError;
 use crate::splat_stats::SplatStats;
-use crate::splat_view::{LEVELS, levels, padded};
+use crate::splat_view::{LEVELS, SURROUNDING_BYTES, SurroundingLevels, levels, padded};
 
 /// The textures of one view, for as long as its size stays.
 #[derive(Clone, Debug)]
@@ -22,6 +23,8 @@ pub(crate) struct SplatTargets {
     /// For each level: its own and all coarser ones.
     pub(crate) totals: Vec<wgpu::TextureView>,
     pub(crate) irradiance: wgpu::Texture,
+    /// What tiles of the view show.
+    pub(crate) surroundings: wgpu::Buffer,
     pub(crate) counts: wgpu::Buffer,
     pub(crate) scale: wgpu::Buffer,
 }
@@ -44,6 +47,115 @@ pub(crate) struct SumFormat {
     pub(crate) is_blended: bool,
 }
 
+impl SumFormat {
+    /// What shaders write.
+    pub(crate) const WRITTEN: Self = Self {
+        format: wgpu::TextureFormat::Rgba32Float,
+        layers: 1,
+        is_blended: false,
+    };
+}
+
+/// A texture that a view needs.
+#[derive(Clone, Copy, Debug)]
+struct ViewTexture {
+    label: &'static str,
+    size: UVec2,
+    mips: u32,
+    layers: u32,
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+}
+
+impl ViewTexture {
+    fn make(&self, device: &wgpu::Device) -> wgpu::Texture {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(self.label),
+            size: self.extent(),
+            mip_level_count: self.mips,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.format,
+            usage: self.usage,
+            view_formats: &[],
+        })
+    }
+
+    fn extent(&self) -> wgpu::Extent3d {
+        wgpu::Extent3d {
+            width: self.size.x,
+            height: self.size.y,
+            depth_or_array_layers: self.layers,
+        }
+    }
+}
+
+/// All textures of a view.
+#[derive(Clone, Copy, Debug)]
+struct ViewTextures {
+    texels: ViewTexture,
+    objects: ViewTexture,
+    sum: ViewTexture,
+    estimate: Option<ViewTexture>,
+    coarse: ViewTexture,
+    irradiance: ViewTexture,
+}
+
+impl ViewTextures {
+    fn of(size: UVec2, format: SumFormat) -> Self {
+        let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
+        let texels = ViewTexture {
+            label: "caustics texels",
+            size: padded(size),
+            mips: LEVELS as u32,
+            layers: 1,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            usage: written,
+        };
+        let sum = ViewTexture {
+            label: "caustics sums",
+            layers: format.layers,
+            format: format.format,
+            usage: if format.is_blended {
+                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING
+            } else {
+                written
+            },
+            ..texels
+        };
+        let is_estimated = format.format == wgpu::TextureFormat::Rgba16Float;
+        Self {
+            texels,
+            objects: ViewTexture {
+                label: "caustics objects",
+                format: wgpu::TextureFormat::R32Uint,
+                ..texels
+            },
+            sum,
+            estimate: is_estimated.then_some(ViewTexture {
+                label: "caustics estimate",
+                layers: 1,
+                ..sum
+            }),
+            coarse: ViewTexture {
+                label: "caustics totals",
+                size: texels.size / 2,
+                mips: texels.mips - 1,
+                format: wgpu::TextureFormat::Rgba32Float,
+                ..texels
+            },
+            irradiance: ViewTexture {
+                label: "caustics irradiance",
+                size,
+                mips: 1,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: written | wgpu::TextureUsages::COPY_SRC,
+                ..texels
+            },
+        }
+    }
+}
+
 impl SplatTargets {
     pub(crate) fn new(
         device: &wgpu::Device,
@@ -51,75 +163,24 @@ impl SplatTargets {
         format: SumFormat,
     ) -> Result<Self, RendererError> {
         let (levels, tiles) = levels(size, device.limits().max_texture_dimension_2d)?;
-        let padded = padded(size);
-        let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
-        let make = |label, size: UVec2, mips, layers, format, usage| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: size.x,
-                    height: size.y,
-                    depth_or_array_layers: layers,
-                },
-                mip_level_count: mips,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            })
-        };
-        let mips = LEVELS as u32;
+        let tiles_shown = SurroundingLevels::of(size).tiles;
+        let bytes = u64::from(tiles_shown) * SURROUNDING_BYTES;
+        let limit = device.limits().max_storage_buffer_binding_size;
+        if bytes > limit {
+            let what = "what the tiles of a view show";
+            return Err(GpuError::BufferTooLarge { what, bytes, limit }.into());
+        }
+        let parts = ViewTextures::of(size, format);
         let single = |texture: &wgpu::Texture| -> Vec<_> {
             (0..texture.mip_level_count())
                 .map(|mip| mip_view(texture, mip, Some(0)))
                 .collect()
         };
-        let texels = make(
-            "caustics texels",
-            padded,
-            mips,
-            1,
-            wgpu::TextureFormat::Rgba32Uint,
-            written,
-        );
-        let objects = make(
-            "caustics objects",
-            padded,
-            mips,
-            1,
-            wgpu::TextureFormat::R32Uint,
-            written,
-        );
-        let usage = if format.is_blended {
-            wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING
-        } else {
-            written
-        };
-        let sum = make(
-            "caustics sums",
-            padded,
-            mips,
-            format.layers,
-            format.format,
-            usage,
-        );
-        let coarse = make(
-            "caustics totals",
-            padded / 2,
-            mips - 1,
-            1,
-            wgpu::TextureFormat::Rgba32Float,
-            written,
-        );
-        let irradiance = make(
-            "caustics irradiance",
-            size,
-            1,
-            1,
-            wgpu::TextureFormat::Rgba32Float,
-            written | wgpu::TextureUsages::COPY_SRC,
-        );
+        let texels = parts.texels.make(device);
+        let objects = parts.objects.make(device);
+        let sum = parts.sum.make(device);
+        let coarse = parts.coarse.make(device);
+        let irradiance = parts.irradiance.make(device);
         let mut totals = vec![irradiance.create_view(&wgpu::TextureViewDescriptor::default())];
         totals.extend(single(&coarse));
         Ok(Self {
@@ -129,12 +190,15 @@ impl SplatTargets {
             texels: single(&texels),
             objects: single(&objects),
             sums: vec![SumTarget::of(&sum)],
-            estimate: (format.format == wgpu::TextureFormat::Rgba16Float).then(|| {
-                let label = "caustics estimate";
-                SumTarget::of(&make(label, padded, mips, 1, format.format, usage))
-            }),
+            estimate: parts.estimate.map(|it| SumTarget::of(&it.make(device))),
             totals,
             irradiance,
+            surroundings: storage_buffer(
+                device,
+                "caustics surroundings",
+                bytes,
+                wgpu::BufferUsages::empty(),
+            ),
             counts: storage_buffer(
                 device,
                 "caustics counts",
@@ -153,21 +217,10 @@ impl SplatTargets {
     /// Makes a second target for sums, which more than one batch needs where they are not blended.
     pub(crate) fn second_sum(&mut self, device: &wgpu::Device) {
         if self.sums.len() == 1 {
-            let padded = padded(self.size);
-            let texture = device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("caustics sums"),
-                size: wgpu::Extent3d {
-                    width: padded.x,
-                    height: padded.y,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: LEVELS as u32,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba32Float,
-                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
+            // The same once more: only what is not blended needs it, and that has one layer.
+            let texture = ViewTextures::of(self.size, SumFormat::WRITTEN)
+                .sum
+                .make(device);
             self.sums.push(SumTarget::of(&texture));
         }
     }
@@ -207,4 +260,53 @@ fn mip_view(texture: &wgpu::Texture, mip: u32, layer: Option<u32>) -> wgpu::Text
         array_layer_count: layer.map(|_| 1),
         ..wgpu::TextureViewDescriptor::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(texture: &ViewTexture) -> u64 {
+        let texel = texture.format.block_copy_size(None).unwrap();
+        let mips = (0..texture.mips).map(|mip| {
+            let size = texture
+                .extent()
+                .mip_level_size(mip, wgpu::TextureDimension::D2);
+            u64::from(size.width) * u64::from(size.height) * u64::from(texture.layers)
+        });
+        u64::from(texel) * mips.sum::<u64>()
+    }
+
+    /// Bytes a pixel of a view of 1920 by 1080, with one target of sums or two.
+    fn bytes_a_pixel(format: SumFormat, sums: u64) -> f64 {
+        let size = UVec2::new(1920, 1080);
+        let parts = ViewTextures::of(size, format);
+        let others = [parts.texels, parts.objects, parts.coarse, parts.irradiance];
+        let textures = others.iter().chain(&parts.estimate).map(bytes).sum::<u64>();
+        let tiles = u64::from(SurroundingLevels::of(size).tiles) * SURROUNDING_BYTES;
+        let all = textures + sums * bytes(&parts.sum) + tiles;
+        all as f64 / f64::from(size.x * size.y)
+    }
+
+    #[test]
+    fn views_take_the_memory_that_the_documentation_says() {
+        let half_floats = SumFormat {
+            format: wgpu::TextureFormat::Rgba16Float,
+            layers: 8,
+            is_blended: true,
+        };
+        let found = [
+            bytes_a_pixel(SumFormat::WRITTEN, 1),
+            bytes_a_pixel(SumFormat::WRITTEN, 2),
+            bytes_a_pixel(half_floats, 1),
+        ];
+        let words = found.map(|it| format!("{it:.0}"));
+        let told = format!(
+            "A view takes {} bytes a pixel, {} where tiles sum several batches, and {} in half floats \
+             and eight layers",
+            words[0], words[1], words[2]
+        );
+        let documentation = include_str!("lib.rs").replace("\n//!", "");
+        assert!(documentation.contains(&told), "{told}");
+    }
 }

@@ -5,15 +5,18 @@ use crate::renderer_error::RendererError;
 use crate::shader::{Shader, shader_piece};
 use crate::splat::SplatSteps;
 use crate::splat_options::SplatOptions;
-use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
+use crate::splat_scratch::{FootprintBatch, GROUP, SPLATS_PER_FOOTPRINT, SplatScratch};
 use crate::splat_targets::SplatTargets;
 use crate::splat_view::{LEVELS, ROUNDS, TILE};
 
 const BIN: Shader = Shader {
     label: "splat_bin",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
+        shader_piece!("pixel_integral"),
+        shader_piece!("surroundings"),
         shader_piece!("splat_place"),
         shader_piece!("splat_bin"),
     ],
@@ -22,8 +25,11 @@ const BIN: Shader = Shader {
 const TILES: Shader = Shader {
     label: "splat_tiles",
     pieces: &[
+        shader_piece!("gate"),
         shader_piece!("density"),
         shader_piece!("splat_view"),
+        shader_piece!("pixel_integral"),
+        shader_piece!("surroundings"),
         shader_piece!("splat_place"),
         shader_piece!("splat_tiles"),
     ],
@@ -56,6 +62,8 @@ impl SplatTiles {
             Slot::Write,
             Slot::Write,
             Slot::Uniform,
+            Slot::Read,
+            Slot::Read,
         ];
         let bin = PassLayout::new(device, "splat_bin", stages, &bin);
         let tiles = [
@@ -68,6 +76,8 @@ impl SplatTiles {
             Slot::UintTexture,
             Slot::Layers,
             Slot::Store(wgpu::TextureFormat::Rgba32Float),
+            Slot::UintTexture,
+            Slot::Read,
         ];
         let tiles = PassLayout::new(device, "splat_tiles", stages, &tiles);
         let nothing = device.create_texture(&wgpu::TextureDescriptor {
@@ -121,6 +131,8 @@ impl SplatTiles {
                     scratch.pairs.as_entire_binding(),
                     targets.counts.as_entire_binding(),
                     steps.in_round(0, is_first, round),
+                    scratch.densities.as_entire_binding(),
+                    targets.surroundings.as_entire_binding(),
                 ],
             )
         };
@@ -130,7 +142,8 @@ impl SplatTiles {
             &scratch.tile_starts,
             targets.tiles,
         )?;
-        let groups = batch.capacity().div_ceil(GROUP).max(1);
+        let splats = batch.capacity() * SPLATS_PER_FOOTPRINT;
+        let groups = splats.div_ceil(GROUP).max(1);
         {
             let mut pass = recorder.compute("splat_bin", 4);
             pass.set_pipeline(&self.count);
@@ -165,6 +178,8 @@ impl SplatTiles {
                         wgpu::BindingResource::TextureView(&targets.texels[level]),
                         wgpu::BindingResource::TextureView(before),
                         wgpu::BindingResource::TextureView(&targets.sums[sums].single[level][0]),
+                        wgpu::BindingResource::TextureView(&targets.objects[level]),
+                        targets.surroundings.as_entire_binding(),
                     ],
                 );
                 let [_, height, across, _] = targets.levels[level];

@@ -13,6 +13,16 @@ pub(crate) const TILE: u32 = 16;
 /// `shaders/splat_place.wgsl`.
 pub(crate) const ROUNDS: usize = 4;
 
+/// Pixels a side of the smallest tiles of which it is known what they show. Mirrors the constant of
+/// the same name in `shaders/surroundings.wgsl`.
+pub(crate) const SURROUNDING_TILE: u32 = 8;
+
+/// Bytes of a `SurroundingTile` of `shaders/surroundings.wgsl`.
+pub(crate) const SURROUNDING_BYTES: u64 = 32;
+
+/// The most levels of such tiles: the next has two of them on each side.
+const SURROUNDING_LEVELS: usize = 12;
+
 /// The most pixels a side of a view: places of pixels are kept in 16 bits.
 const MAX_SIZE: u32 = 1 << 14;
 
@@ -30,7 +40,12 @@ pub(crate) struct SplatView {
     pub(crate) scale: f32,
     pub(crate) max_anisotropy: f32,
     pub(crate) has_objects: u32,
+    pub(crate) integrate_pixels: u32,
+    pub(crate) surrounding_levels: u32,
+    pub(crate) pad_a: u32,
+    pub(crate) pad_b: u32,
     pub(crate) levels: [[u32; 4]; 8],
+    pub(crate) surroundings: [[u32; 4]; SURROUNDING_LEVELS],
 }
 
 /// Mirror of the struct of the same name in `shaders/splat_view.wgsl`.
@@ -67,6 +82,39 @@ pub(crate) fn levels(size: UVec2, max_texture: u32) -> Result<([[u32; 4]; 8], u3
         level_size = UVec2::new(level_size.x.div_ceil(2), level_size.y.div_ceil(2));
     }
     Ok((levels, tiles))
+}
+
+/// The tiles of which it is known what they show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SurroundingLevels {
+    /// Width, height and first tile of each level.
+    pub(crate) levels: [[u32; 4]; SURROUNDING_LEVELS],
+    /// How many levels there are.
+    pub(crate) count: u32,
+    /// All tiles of all levels.
+    pub(crate) tiles: u32,
+}
+
+impl SurroundingLevels {
+    /// For a view of `size` pixels, as [`levels`] accepts it.
+    pub(crate) fn of(size: UVec2) -> Self {
+        let mut all = Self {
+            levels: [[0; 4]; SURROUNDING_LEVELS],
+            count: 0,
+            tiles: 0,
+        };
+        let mut at = (size + (SURROUNDING_TILE - 1)) / SURROUNDING_TILE;
+        for level in &mut all.levels {
+            *level = [at.x, at.y, all.tiles, 0];
+            all.count += 1;
+            all.tiles += at.x * at.y;
+            if at.max_element() <= 1 {
+                break;
+            }
+            at = (at + 1) / 2;
+        }
+        all
+    }
 }
 
 /// The size of the textures whose mip levels hold all levels of a view.
@@ -117,6 +165,18 @@ mod tests {
         assert_eq!(levels[6], [2, 1, 1, 21 + 8 + 2 + 1 + 1 + 1]);
         assert_eq!(tiles, 35);
         assert_eq!(padded(UVec2::new(100, 33)), UVec2::new(128, 64));
+    }
+
+    #[test]
+    fn surroundings_end_in_one_tile() {
+        let found = SurroundingLevels::of(UVec2::new(100, 33));
+        assert_eq!(found.levels[0], [13, 5, 0, 0]);
+        assert_eq!(found.levels[1], [7, 3, 65, 0]);
+        assert_eq!(found.levels[4], [1, 1, 65 + 21 + 8 + 2, 0]);
+        assert_eq!((found.count, found.tiles), (5, 97));
+        let largest = SurroundingLevels::of(UVec2::splat(MAX_SIZE));
+        let last = largest.levels[SURROUNDING_LEVELS - 1];
+        assert_eq!((last[0], last[1], last[2] + 1), (1, 1, largest.tiles));
     }
 
     #[test]

@@ -2,7 +2,7 @@ use glam::{Mat4, UVec2};
 
 use crate::renderer_error::RendererError;
 use crate::splat_options::SplatOptions;
-use crate::splat_view::{SplatView, inverse_and_eye, levels};
+use crate::splat_view::{SplatView, SurroundingLevels, inverse_and_eye, levels};
 
 /// What tells where the surface lies that a pixel sees.
 #[derive(Clone, Copy, Debug)]
@@ -49,8 +49,10 @@ pub struct ViewParams<'a> {
     pub normal_encoding: NormalEncoding,
     /// Reflectance for each channel, linear; without it all is 1.
     pub albedo: Option<&'a wgpu::TextureView>,
-    /// A number for each object, unsigned; it keeps soft light from one object off another that is
-    /// parallel to it. Without it, all is one object.
+    /// The object that each pixel sees, unsigned: its index among
+    /// [`World::objects`](caustics_scene::World::objects), or whatever
+    /// [`FootprintRecord::object`](crate::FootprintRecord::object) of the light says. It keeps light
+    /// off what stands close to its receiver. Without it, all is one object.
     pub objects: Option<&'a wgpu::TextureView>,
     /// What radiance is multiplied by as it is drawn.
     pub exposure: f32,
@@ -88,6 +90,7 @@ impl<'a> ViewParams<'a> {
         max_texture: u32,
     ) -> Result<SplatView, RendererError> {
         let (levels, _) = levels(UVec2::from(self.size), max_texture)?;
+        let surroundings = SurroundingLevels::of(UVec2::from(self.size));
         let matrix = Mat4::from_cols_array_2d(&self.view_projection);
         let Some((inverse, eye)) = inverse_and_eye(&matrix, self.background_depth) else {
             return Err(RendererError::SingularProjection { view: index });
@@ -103,7 +106,12 @@ impl<'a> ViewParams<'a> {
             scale: options.scale,
             max_anisotropy: options.anisotropy_or_zero(),
             has_objects: u32::from(self.objects.is_some()),
+            integrate_pixels: u32::from(options.integrates_pixels()),
+            surrounding_levels: surroundings.count,
+            pad_a: 0,
+            pad_b: 0,
             levels,
+            surroundings: surroundings.levels,
         })
     }
 }

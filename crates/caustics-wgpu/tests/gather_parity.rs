@@ -40,17 +40,20 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         let picture = stage.picture(&stage.camera, [100, 75]);
         let seen = picture.seen.iter().flatten();
         let points: Vec<GatherPoint> = seen
-            .map(|it| (it.position, it.normal))
+            .map(|it| (it.position, it.normal, it.object))
             .chain(
                 stage
                     .photons
                     .iter()
                     .step_by(7)
-                    .map(|it| (it.position, it.normal)),
+                    .map(|it| (it.position, it.normal, it.object)),
             )
-            .map(|(position, normal)| GatherPoint {
+            .enumerate()
+            // The object of every other one is not known.
+            .map(|(index, (position, normal, object))| GatherPoint {
                 position: position.to_array(),
                 normal: normal.to_array(),
+                object_plus_one: if index % 2 == 0 { object + 1 } else { 0 },
                 ..GatherPoint::default()
             })
             .collect();
@@ -78,7 +81,11 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         let found: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&found);
         let (mut off, mut sum, mut exact, mut lit) = (0.0f64, 0.0f64, 0, 0);
         for (point, found) in points.iter().zip(&found) {
-            let expected = expected.irradiance(point.position.into(), point.normal.into());
+            let (position, normal) = (point.position.into(), point.normal.into());
+            let expected = match point.object_plus_one.checked_sub(1) {
+                Some(object) => expected.irradiance_on(object, position, normal),
+                None => expected.irradiance(position, normal),
+            };
             let difference = (Vec3::new(found[0], found[1], found[2]) - expected).abs();
             off += f64::from(difference.element_sum());
             sum += f64::from(expected.element_sum());

@@ -1,5 +1,6 @@
 //! The engine: a rasteriser with a G-buffer, as a host of caustics has one.
 
+mod overlay;
 mod pipelines;
 mod scene_mesh;
 
@@ -11,6 +12,7 @@ use caustics::glam::{Vec3, Vec4};
 use caustics::prelude::{Camera, Light, World};
 use caustics_wgpu::camera_matrix;
 
+use overlay::Overlay;
 pub use pipelines::LIT_FORMAT;
 use pipelines::Pipelines;
 use scene_mesh::SceneMesh;
@@ -27,6 +29,7 @@ const OBJECT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 #[derive(Debug)]
 pub struct Engine {
     pipelines: Pipelines,
+    overlay: Overlay,
     opaque: (wgpu::Buffer, u32),
     shining: (wgpu::Buffer, u32),
     globals: wgpu::Buffer,
@@ -116,6 +119,7 @@ impl Engine {
             shadow: target(device, [SHADOW_SIZE; 2], DEPTH_FORMAT),
             targets: Targets::new(device, size),
             pipelines,
+            overlay: Overlay::new(device, format),
             center,
             radius,
         }
@@ -221,6 +225,17 @@ impl Engine {
         pass.set_bind_group(0, &self.globals_group, &[]);
         pass.set_bind_group(1, &group, &[]);
         pass.draw(0..3, 0..1);
+    }
+
+    /// Draws lines of text onto what the tone map has written.
+    pub fn draw_text(
+        &self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        into: &wgpu::TextureView,
+        lines: &[String],
+    ) {
+        self.overlay.draw(queue, encoder, into, lines);
     }
 
     fn globals(&self, look: &Look) -> Globals {

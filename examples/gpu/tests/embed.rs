@@ -25,7 +25,6 @@ impl Expected {
         };
         // As on the GPU.
         options.trace.check_footprints = false;
-        options.footprint.integrate_pixels = false;
         let size = PictureOptions {
             width,
             height,

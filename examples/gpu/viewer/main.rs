@@ -1,6 +1,17 @@
 //! Looks at caustics in a window.
 //!
 //! `cargo run --release -p caustics-gpu-examples --example viewer -- --help` lists keys and options.
+//!
+//! Left drag orbits, right drag moves the light; what each pass takes stands in the upper left
+//! corner, where the device can tell. To run it without a display, in the X server that draws into
+//! memory (Debian's packages `xvfb`, `libxkbcommon-x11-0`, `libx11-xcb1` and `mesa-vulkan-drivers`):
+//!
+//! ```text
+//! xvfb-run -a cargo run --release -p caustics-gpu-examples --example viewer -- \
+//!     --frames 30 --screenshot viewer.png
+//! ```
+//!
+//! `--headless` needs no X server either, and draws into a texture.
 
 mod arguments;
 mod orbit;
@@ -32,16 +43,17 @@ fn run() -> Result<(), Failure> {
         return Ok(());
     };
     if arguments.is_headless {
-        without_window(&arguments)
+        without_window(arguments)
     } else {
         window::run(arguments)
     }
 }
 
 /// The same frames without a window: the camera goes round and the light with it.
-fn without_window(arguments: &Arguments) -> Result<(), Failure> {
+fn without_window(mut arguments: Arguments) -> Result<(), Failure> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let (adapter, device, queue) = headless::device(&instance, None)?;
+    arguments.fit(&adapter);
     let format = wgpu::TextureFormat::Rgba8UnormSrgb;
     let scene = arguments.scene()?;
     let mut orbit = Orbit::new(&scene)?;

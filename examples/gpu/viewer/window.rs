@@ -1,10 +1,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use caustics_gpu_examples::picture::{FrameNotes, offscreen, write_png};
+use caustics_gpu_examples::picture::{FrameNotes, PassMilliseconds, offscreen, write_png};
 use caustics_gpu_examples::stage::Stage;
 use caustics_gpu_examples::{Failure, headless};
-use caustics_wgpu::{SplatKernel, SplatMethod};
+use caustics_wgpu::{SplatKernel, SplatMethod, SplatStats};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
@@ -22,6 +22,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let mut viewer = Viewer {
         orbit: Orbit::new(&arguments.scene()?)?,
         arguments,
+        lines: Vec::new(),
+        is_text_hidden: false,
+        is_light_moved: false,
         open: None,
         failure: None,
         held: None,
@@ -35,6 +38,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
 struct Viewer {
     arguments: Arguments,
     orbit: Orbit,
+    /// What is shown of the frame before.
+    lines: Vec<String>,
+    is_text_hidden: bool,
+    /// Whether the light has moved since it was aimed: the mouse tells more often than frames come.
+    is_light_moved: bool,
     open: Option<OpenWindow>,
     failure: Option<Failure>,
     held: Option<MouseButton>,
@@ -52,7 +60,7 @@ struct OpenWindow {
 }
 
 impl OpenWindow {
-    fn new(event_loop: &ActiveEventLoop, arguments: &Arguments) -> Result<Self, Failure> {
+    fn new(event_loop: &ActiveEventLoop, arguments: &mut Arguments) -> Result<Self, Failure> {
         let [width, height] = arguments.size;
         let attributes = Window::default_attributes()
             .with_title("caustics")
@@ -61,6 +69,8 @@ impl OpenWindow {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let surface = instance.create_surface(window.clone())?;
         let (adapter, device, queue) = headless::device(&instance, Some(&surface))?;
+        arguments.fit(&adapter);
+        println!("{}", adapter.get_info().name);
         let size = window.inner_size();
         let mut config = surface
             .get_default_config(&adapter, size.width.max(1), size.height.max(1))
@@ -103,6 +113,9 @@ impl OpenWindow {
 
 impl Viewer {
     fn draw(&mut self) -> Result<(), Failure> {
+        if std::mem::take(&mut self.is_light_moved) {
+            self.aim()?;
+        }
         let Some(open) = &mut self.open else {
             return Ok(());
         };
@@ -125,22 +138,46 @@ impl Viewer {
         let mut encoder = open.device.create_command_encoder(&descriptor);
         let (device, queue) = (&open.device, &open.queue);
         let prepared = open.stage.draw(device, queue, &mut encoder, &look, &view)?;
+        if !self.is_text_hidden {
+            let engine = &open.stage.engine;
+            engine.draw_text(queue, &mut encoder, &view, &self.lines);
+        }
         let notes = FrameNotes::record(device, &mut encoder, &prepared)?;
         queue.submit([encoder.finish()]);
         open.window.pre_present_notify();
         queue.present(texture);
         // A viewer may wait for its timings; a game would read them a frame later.
         let (stats, times) = notes.read(device, &prepared)?;
-        let caustics: f64 = times.iter().map(|(_, milliseconds)| milliseconds).sum();
         self.frame += 1;
-        open.window.set_title(&format!(
-            "caustics: {:.1} ms a frame, {caustics:.2} ms of it caustics, {} photons, {} splats by {:?}",
-            1e3 * start.elapsed().as_secs_f64(),
-            self.arguments.photons,
-            stats.splatted,
-            self.arguments.splat.method,
-        ));
+        let milliseconds = 1e3 * start.elapsed().as_secs_f64();
+        open.window
+            .set_title(&format!("caustics: {milliseconds:.1} ms a frame"));
+        self.note(milliseconds, &stats, &times);
+        if self.arguments.frames.is_some() {
+            println!("frame {}: {milliseconds:.1} ms", self.frame);
+        }
         Ok(())
+    }
+
+    /// What the next frame shows of this one.
+    fn note(&mut self, milliseconds: f64, stats: &SplatStats, times: &PassMilliseconds) {
+        let splat = &self.arguments.splat;
+        self.lines = vec![
+            format!("{milliseconds:9.2} ms a frame"),
+            format!("{:9} photons", self.arguments.photons()),
+            format!("{:9} splats by {:?}", stats.splatted, splat.method),
+            format!("          {:?} kernel", splat.kernel),
+        ];
+        if splat.kernel == SplatKernel::Gaussian {
+            let how = if splat.integrate_pixels {
+                "integrated over pixels"
+            } else {
+                "read at pixels"
+            };
+            self.lines.push(format!("          {how}"));
+        }
+        let passes = times.iter().map(|(pass, it)| format!("{it:9.2} ms {pass}"));
+        self.lines.extend(passes);
     }
 
     /// The last frame once more, where it can be read.
@@ -156,6 +193,10 @@ impl Viewer {
         let mut encoder = open.device.create_command_encoder(&descriptor);
         let (device, queue) = (&open.device, &open.queue);
         open.stage.draw(device, queue, &mut encoder, &look, &view)?;
+        if !self.is_text_hidden {
+            let engine = &open.stage.engine;
+            engine.draw_text(queue, &mut encoder, &view, &self.lines);
+        }
         queue.submit([encoder.finish()]);
         let mut pixels = headless::read_texture(device, queue, &texture, 4)?;
         if matches!(
@@ -195,12 +236,17 @@ impl Viewer {
             Key::Character("2") => splat.kernel = SplatKernel::Ellipse,
             Key::Character("3") => splat.kernel = SplatKernel::Disc,
             Key::Character("4") => splat.kernel = SplatKernel::Tent,
+            Key::Character("i") => splat.integrate_pixels = !splat.integrate_pixels,
+            Key::Character("h") => {
+                self.is_text_hidden = !self.is_text_hidden;
+                return Ok(());
+            }
             Key::Character("+" | "=") => {
-                self.arguments.photons = (2 * self.arguments.photons).min(1 << 22);
+                self.arguments.set_photons(2 * self.arguments.photons());
                 return self.aim();
             }
             Key::Character("-") => {
-                self.arguments.photons = (self.arguments.photons / 2).max(1024);
+                self.arguments.set_photons(self.arguments.photons() / 2);
                 return self.aim();
             }
             _ => return Ok(()),
@@ -208,17 +254,16 @@ impl Viewer {
         self.set_splat()
     }
 
-    fn drag(&mut self, x: f32, y: f32) -> Result<(), Failure> {
+    fn drag(&mut self, x: f32, y: f32) {
         let [from_x, from_y] = std::mem::replace(&mut self.pointer, [x, y]);
         match self.held {
             Some(MouseButton::Left) => self.orbit.turn(x - from_x, y - from_y),
             Some(MouseButton::Right) => {
                 self.orbit.drag_light(x - from_x, y - from_y);
-                return self.aim();
+                self.is_light_moved = true;
             }
             _ => {}
         }
-        Ok(())
     }
 
     fn handle(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) -> Result<(), Failure> {
@@ -236,7 +281,7 @@ impl Viewer {
                 self.held = (state == ElementState::Pressed).then_some(button);
             }
             WindowEvent::CursorMoved { position, .. } => {
-                self.drag(position.x as f32, position.y as f32)?;
+                self.drag(position.x as f32, position.y as f32);
             }
             WindowEvent::MouseWheel { delta, .. } => {
                 let lines = match delta {
@@ -267,7 +312,7 @@ impl Viewer {
 impl ApplicationHandler for Viewer {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if self.open.is_none() {
-            match OpenWindow::new(event_loop, &self.arguments) {
+            match OpenWindow::new(event_loop, &mut self.arguments) {
                 Ok(open) => {
                     open.window.request_redraw();
                     self.open = Some(open);

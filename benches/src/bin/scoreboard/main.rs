@@ -4,7 +4,6 @@
 
 mod arguments;
 mod chart;
-mod flip;
 mod full;
 mod measure;
 mod metric;

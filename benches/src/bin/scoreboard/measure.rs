@@ -6,13 +6,13 @@ use caustics::CausticsOptions;
 use caustics::filter::{Comparison, Image, write_exr};
 use caustics::render::{Estimate, GBuffer, splat};
 use caustics::trace::{PhotonMap, TraceOptions, trace_photons};
+use caustics_benches::flip::Flip;
 use caustics_benches::receivers::{Receiver, receivers};
 use caustics_benches::score::{Conditions, Row};
 use caustics_benches::stage::{Failure, Stage};
 use caustics_benches::timing::{Patience, Timed, median_of};
 
 use crate::arguments::Arguments;
-use crate::flip::Flip;
 use crate::nearest_search::{best_options, image_of};
 
 /// What the pixels see, in the two forms that estimates want, and how long each took.

@@ -1,4 +1,4 @@
-// A photon's footprint as a density over its receiver's tangent plane: covariance, kernel, gates.
+// A photon's footprint as a density over its receiver's tangent plane: covariance and kernel.
 // CPU twins: `footprint.rs`, `footprint_kernel.rs` and `covariance.rs` of caustics-render.
 
 // 0 Gaussian, 1 ellipse (Epanechnikov), 2 disc, 3 tent: as `FootprintKernel::ALL` has them.
@@ -9,8 +9,6 @@ const KERNEL_ELLIPSE: u32 = 1u;
 const KERNEL_DISC: u32 = 2u;
 
 const MIN_INCIDENCE: f32 = 0.05;
-const MIN_NORMAL_COSINE: f32 = 0.5;
-const PLANE_DISTANCE: f32 = 0.3;
 const MAX_SLIDE: f32 = 2.0;
 const GAUSSIAN_CUT: f32 = 9.0;
 // sqrt(6): the radius at which the ellipse and the tent have variance 1.
@@ -32,7 +30,7 @@ struct Density {
     is_valid: bool,
 }
 
-// A prepared footprint as memory holds it. Rust mirror: `GpuDensity`, 64 bytes.
+// A prepared footprint as memory holds it: 80 bytes.
 struct StoredDensity {
     center: vec3<f32>,
     // Octahedral, two signed 16-bit parts.
@@ -41,10 +39,17 @@ struct StoredDensity {
     // Octahedral, in full: at grazing incidence the cosine is as small as its error else.
     incoming_x: f32,
     v_gradient: vec3<f32>,
-    // How far before its plane it lights, in metres.
+    // Of the gate, as the next but one and the one after it.
     reach: f32,
     strength: vec3<f32>,
     incoming_y: f32,
+    // Index of its receiver among the world's objects.
+    object: u32,
+    before: f32,
+    plane_distance: f32,
+    // How far off the plane, in metres, is still in it: the pixels that see it are those that see
+    // where its light meets the plane, to half a pixel.
+    flat: f32,
 }
 
 // A symmetric matrix in the tangent plane's basis: xx, xy, yy.
@@ -242,7 +247,16 @@ fn density_reach(d: Density) -> f32 {
     return density_radius(d) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
 }
 
-fn density_store(d: Density) -> StoredDensity {
+// The way from a plane towards the light, one metre off the plane.
+fn towards_light(incoming: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    let incidence = dot(incoming, normal);
+    if incidence < -MIN_INCIDENCE {
+        return incoming / incidence;
+    }
+    return normal;
+}
+
+fn density_store(d: Density, gate: Gate, object: u32) -> StoredDensity {
     var stored: StoredDensity;
     stored.center = d.center;
     stored.normal = encode_octahedral(d.normal);
@@ -251,27 +265,34 @@ fn density_store(d: Density) -> StoredDensity {
     stored.incoming_x = incoming.x;
     stored.incoming_y = incoming.y;
     stored.v_gradient = d.v_gradient;
-    stored.reach = density_reach(d);
+    stored.reach = gate.reach;
     stored.strength = d.strength;
+    stored.object = object;
+    stored.before = gate.before;
+    stored.plane_distance = gate.plane_distance;
     return stored;
 }
 
-// Kernel and cosine that a stored density has at a point of a surface with unit `normal`, where it
-// passes the gates; times the strength it is an irradiance.
-fn density_weight(
+// The cosine at which a stored density's light falls on a point of a surface with unit `normal`, 0
+// where the point does not pass the gate.
+fn density_cosine(
     stored: StoredDensity,
     plane: vec3<f32>,
     incoming: vec3<f32>,
     position: vec3<f32>,
     normal: vec3<f32>,
+    is_own: bool,
 ) -> f32 {
-    let relative = position - stored.center;
-    let off = dot(relative, plane);
-    let alike = dot(normal, plane);
-    let lowest = select(0.0, -PLANE_DISTANCE * stored.reach, alike >= MIN_NORMAL_COSINE);
-    if off < lowest || off > stored.reach {
+    let off = dot(position - stored.center, plane);
+    let gate = Gate(stored.before, stored.reach, stored.plane_distance);
+    if !gate_admits(gate, off, dot(normal, plane), is_own) {
         return 0.0;
     }
-    let kernel = kernel_density(dot(relative, stored.u_gradient), dot(relative, stored.v_gradient));
-    return kernel * max(-dot(normal, incoming), 0.0);
+    return max(-dot(normal, incoming), 0.0);
+}
+
+// The kernel of a stored density at a point.
+fn density_kernel(stored: StoredDensity, position: vec3<f32>) -> f32 {
+    let relative = position - stored.center;
+    return kernel_density(dot(relative, stored.u_gradient), dot(relative, stored.v_gradient));
 }

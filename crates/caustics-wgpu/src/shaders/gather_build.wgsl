@@ -20,11 +20,7 @@ struct Cells {
 // The cells that the box around what a footprint may light touches.
 fn cells_of(d: Density) -> Cells {
     let half = kernel_outer_reach() * sqrt(d.axis_u * d.axis_u + d.axis_v * d.axis_v);
-    let incidence = dot(d.incoming, d.normal);
-    var up = d.normal;
-    if incidence < -MIN_INCIDENCE {
-        up = d.incoming / incidence;
-    }
+    let up = towards_light(d.incoming, d.normal);
     let reach = density_reach(d);
     let low = -PLANE_DISTANCE * reach * up;
     let high = reach * up;
@@ -108,7 +104,7 @@ fn gather_count(@builtin(global_invocation_id) id: vec3<u32>) {
     atomicAdd(&counts[2], u32(is_shortened(record)));
     let cells = cells_of(d);
     atomicOr(&counts[6], 1u << cells.size);
-    densities[id.x] = density_store(d);
+    densities[id.x] = density_store(d, gate_of(density_reach(d)), record.object);
     for (var corner = 0u; corner < 8u; corner++) {
         let list = list_of(cells, corner);
         if list != NO_FOOTPRINT {

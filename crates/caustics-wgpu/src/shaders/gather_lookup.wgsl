@@ -1,5 +1,9 @@
-// The irradiance of the caustics at any point, in W/m²: `caustics_irradiance`.
-// CPU twin: `FootprintGather::irradiance` of caustics-render.
+// The irradiance of the caustics at any point, in W/m²: `caustics_irradiance` and
+// `caustics_irradiance_on`.
+// CPU twins: `FootprintGather::irradiance` and `irradiance_on` of caustics-render.
+
+// For points whose object is not known.
+const CAUSTICS_ANY_OBJECT: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<uniform> caustics_grid: GatherGrid;
 @group(0) @binding(1) var<storage, read> caustics_densities: array<StoredDensity>;
@@ -7,8 +11,14 @@
 @group(0) @binding(3) var<storage, read> caustics_entries: array<u32>;
 @group(0) @binding(4) var<storage, read> caustics_counts: array<u32>;
 
-// At a point of a surface with unit `normal`, by the light that falls on the side of the normal.
+// At a point of a surface with unit `normal`, by the light that falls on the side of the normal;
+// whatever object it belongs to.
 fn caustics_irradiance(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    return caustics_irradiance_on(CAUSTICS_ANY_OBJECT, position, normal);
+}
+
+// The same at a point of the object with this index among the world's.
+fn caustics_irradiance_on(object: u32, position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     var sizes = caustics_counts[6];
     while sizes != 0u {
@@ -26,7 +36,11 @@ fn caustics_irradiance(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
             let stored = caustics_densities[entry & ((1u << GATHER_SIZE_SHIFT) - 1u)];
             let incoming = stored_incoming(stored);
             let plane = decode_octahedral(stored.normal);
-            sum += density_weight(stored, plane, incoming, position, normal) * stored.strength;
+            let is_own = object == CAUSTICS_ANY_OBJECT || object == stored.object;
+            let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
+            if cosine > 0.0 {
+                sum += cosine * density_kernel(stored, position) * stored.strength;
+            }
         }
     }
     return sum;

@@ -4,7 +4,8 @@ struct GatherPoint {
     position: vec3<f32>,
     pad_a: f32,
     normal: vec3<f32>,
-    pad_b: f32,
+    // Index of its object plus one; 0 where it is not known.
+    object_plus_one: u32,
 }
 
 @group(1) @binding(0) var<storage, read> points: array<GatherPoint>;
@@ -14,6 +15,8 @@ struct GatherPoint {
 fn gather_points(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < min(arrayLength(&points), arrayLength(&irradiance)) {
         let point = points[id.x];
-        irradiance[id.x] = vec4<f32>(caustics_irradiance(point.position, point.normal), 0.0);
+        // 0 wraps around to any object.
+        let object = point.object_plus_one - 1u;
+        irradiance[id.x] = vec4<f32>(caustics_irradiance_on(object, point.position, point.normal), 0.0);
     }
 }

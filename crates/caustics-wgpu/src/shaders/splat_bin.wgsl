@@ -8,11 +8,26 @@
 @group(0) @binding(4) var<storage, read_write> pairs: array<u32>;
 @group(0) @binding(5) var<storage, read_write> counts: SplatCounts;
 @group(0) @binding(6) var<uniform> step: SplatStep;
+@group(0) @binding(7) var<storage, read> densities: array<StoredDensity>;
+@group(0) @binding(8) var<storage, read> surroundings: array<SurroundingTile>;
+
+fn footprint_count() -> u32 {
+    return atomicLoad(&counts.footprints) + atomicLoad(&counts.caught);
+}
+
+// Whether a footprint may light a pixel of a tile.
+fn may_light(index: u32, place: SplatPlace, tile: vec2<u32>) -> bool {
+    if place.shape == SHAPE_ELLIPSE || place.shape == SHAPE_INTEGRAL {
+        return true;
+    }
+    let its = surrounding_of_tile(place.level, tile);
+    return relation(surroundings[its.x], its.y != 0u, densities[index]) != RELATION_DARK;
+}
 
 // Counts, for each tile, the footprints that may light a pixel of it.
 @compute @workgroup_size(256)
 fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= atomicLoad(&counts.footprints) {
+    if id.x >= footprint_count() {
         return;
     }
     let place = places[id.x];
@@ -21,7 +36,9 @@ fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var row = rows.x; row < rows.y; row++) {
         let columns = tile_columns(place, row);
         for (var column = columns.x; column < columns.y; column++) {
-            atomicAdd(&tile_cursors[level.w + row * level.z + column], 1u);
+            if may_light(id.x, place, vec2<u32>(column, row)) {
+                atomicAdd(&tile_cursors[level.w + row * level.z + column], 1u);
+            }
         }
     }
 }
@@ -29,7 +46,7 @@ fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
 // Writes each footprint's number into the lists of its tiles.
 @compute @workgroup_size(256)
 fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= atomicLoad(&counts.footprints) {
+    if id.x >= footprint_count() {
         return;
     }
     let place = places[id.x];
@@ -49,7 +66,8 @@ fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
         let columns = tile_columns(place, row);
         for (var column = columns.x; column < columns.y; column++) {
             let tile = level.w + row * level.z + column;
-            if round_of(tile_starts[tile], each) != step.round {
+            let is_mine = round_of(tile_starts[tile], each) == step.round;
+            if !(is_mine && may_light(id.x, place, vec2<u32>(column, row))) {
                 continue;
             }
             let at = tile_starts[tile] - step.round * each + atomicAdd(&tile_cursors[tile], 1u);

@@ -1,5 +1,5 @@
 // One level of receivers at half the resolution of the one before: each stands for four pixels, by
-// the one nearest their middle, moved to the middle of those on the same surface.
+// the first of them, moved in its plane to where their middle sees it.
 // CPU twin: `Level::coarser` of caustics-render.
 
 @group(0) @binding(0) var<uniform> view: SplatView;
@@ -43,7 +43,13 @@ fn splat_coarsen(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     if count > 0.0 {
-        nearest = vec4<u32>(bitcast<vec3<u32>>(sum / count), nearest.w);
+        var position = sum / count;
+        // Where only a part of the four sees it, or the picture ends, the mean is not the middle.
+        if count < 4.0 {
+            let middle = (vec2<f32>(id.xy) + 0.5) * exp2(f32(step.level));
+            position = on_plane(middle, position, normal);
+        }
+        nearest = vec4<u32>(bitcast<vec3<u32>>(position), nearest.w);
     }
     textureStore(texels_out, vec2<i32>(id.xy), nearest);
     textureStore(objects_out, vec2<i32>(id.xy), vec4<u32>(object, 0u, 0u, 0u));

@@ -14,7 +14,7 @@ const HALF_FLOAT_BOUND: f32 = 32768.0;
 
 @compute @workgroup_size(256)
 fn splat_order(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= atomicLoad(&counts.footprints) {
+    if id.x >= atomicLoad(&counts.footprints) + atomicLoad(&counts.caught) {
         return;
     }
     let place = places[id.x];

@@ -1,35 +1,52 @@
 // Where a footprint lies on the screen, and which tiles it touches.
 // CPU twin: `Splat::span` of caustics-render's `splat.rs`.
 
-// Rust mirror: `GpuSplatPlace`, 40 bytes.
+// What lies in a footprint: all pixels of its box; those of its ellipse; those of its ellipse in
+// tiles that show nothing but its receiver in its plane, and all in others; or what a normal
+// distribution over pixels reaches.
+const SHAPE_BOX: u32 = 0u;
+const SHAPE_ELLIPSE: u32 = 1u;
+const SHAPE_BY_TILE: u32 = 2u;
+const SHAPE_INTEGRAL: u32 = 3u;
+
+// 40 bytes.
 struct SplatPlace {
     // Middle, in pixels of the level.
     center: vec2<f32>,
-    // What a step of one pixel of the level along x and y adds to the footprint's coordinates.
+    // What a step of one pixel of the level along x and y adds to the footprint's coordinates. Of
+    // an integral, what is in a `PixelGaussian` after its center.
     step_x: vec2<f32>,
     step_y: vec2<f32>,
     // First pixel in the lower half, the one after the last in the upper.
     columns: u32,
     rows: u32,
     level: u32,
-    // Whether a pixel's coordinates tell where it lies in the footprint.
-    is_local: u32,
+    shape: u32,
 }
 
-// Rust mirror: `GpuSplatCounts`.
+// Rust mirror: `SplatCounts`.
 struct SplatCounts {
     splatted: atomic<u32>,
     outside: atomic<u32>,
+    hidden: atomic<u32>,
     turned_away: atomic<u32>,
     invalid: atomic<u32>,
     // Pairs of a footprint and a tile, and those of them for which there was no room.
     pairs: atomic<u32>,
     dropped_pairs: atomic<u32>,
-    // Footprints of this batch.
+    // From here on of one batch: footprints, and what others catch of them before their planes,
+    // which is splatted for itself and numbered after them.
     footprints: atomic<u32>,
+    caught: atomic<u32>,
     pad: u32,
     by_level: array<atomic<u32>, 8>,
     level_cursor: array<atomic<u32>, 8>,
+}
+
+fn integral_of(place: SplatPlace) -> PixelGaussian {
+    let step_x = place.step_x;
+    let step_y = place.step_y;
+    return PixelGaussian(place.center, step_x.x, step_x.y, step_y.x, step_y.y);
 }
 
 fn range_of(packed: u32) -> vec2<u32> {
@@ -64,7 +81,16 @@ fn tile_rows(place: SplatPlace) -> vec2<u32> {
 // pixel's receiver need not lie under its middle.
 fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
     var columns = range_of(place.columns);
-    if place.is_local != 0u {
+    if place.shape == SHAPE_INTEGRAL {
+        let low = f32(row * TILE);
+        let ends = pixel_gaussian_span(integral_of(place), low, low + f32(TILE));
+        if ends.y < ends.x {
+            return vec2<u32>(0u);
+        }
+        let most = vec2<f32>(columns);
+        columns.x = u32(clamp(floor(ends.x), most.x, most.y));
+        columns.y = u32(clamp(ceil(ends.y), most.x, most.y));
+    } else if place.shape == SHAPE_ELLIPSE {
         let a = dot(place.step_x, place.step_x);
         let b = dot(place.step_x, place.step_y);
         let c = dot(place.step_y, place.step_y);

@@ -7,18 +7,14 @@ const LEVEL_SIGMA: f32 = 2.0;
 const SMALL_SIGMA: f32 = 0.9;
 // Footprints longer than this many pixels are not summed.
 const SUMMED_EXTENT: f32 = 64.0;
-
-struct PixelAxes {
-    x: vec3<f32>,
-    y: vec3<f32>,
-    is_valid: bool,
-}
-
-struct Bounds {
-    low: vec2<f32>,
-    high: vec2<f32>,
-    is_exact: bool,
-}
+// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles;
+// narrower ones are integrated over the pixels.
+const INTEGRATED_SIGMA: f32 = 0.9;
+// Half the widest rectangle of pixels that a footprint is integrated over.
+const INTEGRATED_EXTENT: f32 = 48.0;
+// The least cosine between the view and the normal of a footprint at which its blur serves for what
+// stands before its plane, too.
+const LEAST_FACING: f32 = 0.3;
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<storage, read> footprints: array<FootprintRecord>;
@@ -27,54 +23,9 @@ struct Bounds {
 @group(0) @binding(4) var<storage, read_write> places: array<SplatPlace>;
 @group(0) @binding(5) var<storage, read_write> counts: SplatCounts;
 @group(0) @binding(6) var<storage, read_write> peak_sums: array<f32>;
+@group(0) @binding(7) var<storage, read> surroundings: array<SurroundingTile>;
 
 var<workgroup> peaks: array<f32, 256>;
-
-// In pixels, with the depth along the view as z: behind the eye where it is not positive.
-fn project(point: vec3<f32>) -> vec3<f32> {
-    let clip = view.view_projection * vec4<f32>(point, 1.0);
-    let ndc = clip.xy / clip.w;
-    return vec3<f32>(vec2<f32>(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * vec2<f32>(view.size), clip.w);
-}
-
-// How the point of a plane that a pixel sees moves with the pixel's two coordinates: the inverse of
-// the projection's derivative in the plane.
-fn pixel_axes(point: vec3<f32>, normal: vec3<f32>) -> PixelAxes {
-    let tangent = tangent_of(normal);
-    let bitangent = bitangent_of(normal);
-    let clip = view.view_projection * vec4<f32>(point, 1.0);
-    let ndc = clip.xy / clip.w;
-    let half_size = vec2<f32>(0.5, -0.5) * vec2<f32>(view.size) / clip.w;
-    let along_t = view.view_projection * vec4<f32>(tangent, 0.0);
-    let along_b = view.view_projection * vec4<f32>(bitangent, 0.0);
-    let t = (along_t.xy - ndc * along_t.w) * half_size;
-    let b = (along_b.xy - ndc * along_b.w) * half_size;
-    let determinant = t.x * b.y - t.y * b.x;
-    var axes: PixelAxes;
-    axes.x = (b.y * tangent - t.y * bitangent) / determinant;
-    axes.y = (t.x * bitangent - b.x * tangent) / determinant;
-    axes.is_valid = clip.w > 0.0 && determinant != 0.0 && is_finite_vector(axes.x)
-        && is_finite_vector(axes.y);
-    return axes;
-}
-
-fn bounds_of(d: Density, depth: f32) -> Bounds {
-    let a = kernel_reach() * d.axis_u;
-    let b = kernel_reach() * d.axis_v;
-    let p = project(d.center + a + b);
-    let q = project(d.center + a - b);
-    let r = project(d.center - a + b);
-    let s = project(d.center - a - b);
-    let near = 0.3 * abs(depth);
-    if min(min(p.z, q.z), min(r.z, s.z)) > near {
-        return Bounds(
-            min(min(p.xy, q.xy), min(r.xy, s.xy)),
-            max(max(p.xy, q.xy), max(r.xy, s.xy)),
-            true,
-        );
-    }
-    return Bounds(vec2<f32>(0.0), vec2<f32>(view.size), false);
-}
 
 // The smallest standard deviation across the screen, in pixels.
 fn least_sigma(step_x: vec2<f32>, step_y: vec2<f32>) -> f32 {
@@ -117,65 +68,224 @@ fn pixel_range(low: f32, high: f32, stride: f32, size: u32) -> u32 {
     return first | (last << 16u);
 }
 
-// Prepares one footprint and returns the peak of its irradiance, 0 if it is not splatted.
-fn prepare(index: u32) -> f32 {
-    let record = footprints[index];
-    places[index].rows = 0u;
-    let facing = dot(record.normal, view.eye.xyz - view.eye.w * record.position);
-    if facing <= 0.0 {
-        atomicAdd(&counts.turned_away, 1u);
-        return 0.0;
-    }
-    var c = covariance_of_axes(record.axis_u, record.axis_v, record.normal, view.scale, view.max_anisotropy);
-    let axes = pixel_axes(record.position, record.normal);
-    if axes.is_valid {
-        let tangent = tangent_of(record.normal);
-        let bitangent = bitangent_of(record.normal);
-        let variance = kernel_pixel_variance();
-        c = covariance_add(c, variance, dot(axes.x, tangent), dot(axes.x, bitangent));
-        c = covariance_add(c, variance, dot(axes.y, tangent), dot(axes.y, bitangent));
-    }
-    let flux = vec3<f32>(record.flux_r, record.flux_g, record.flux_b);
-    var d = density_spread(record.position, record.normal, record.incoming, flux, c);
-    if !(d.is_valid && is_finite_vector(record.position)) {
-        atomicAdd(&counts.invalid, 1u);
-        return 0.0;
-    }
-    let center = project(record.position);
-    let bounds = bounds_of(d, center.z);
-    if any(bounds.high < vec2<f32>(0.0)) || any(bounds.low > vec2<f32>(view.size)) {
-        atomicAdd(&counts.outside, 1u);
-        return 0.0;
-    }
-    atomicAdd(&counts.splatted, 1u);
-    var place: SplatPlace;
-    place.is_local = u32(bounds.is_exact && axes.is_valid);
-    var sigma = 1e30;
-    if place.is_local != 0u {
-        place.center = center.xy;
-        place.step_x = vec2<f32>(dot(axes.x, d.u_gradient), dot(axes.x, d.v_gradient));
-        place.step_y = vec2<f32>(dot(axes.y, d.u_gradient), dot(axes.y, d.v_gradient));
-        sigma = least_sigma(place.step_x, place.step_y);
-        if sigma < SMALL_SIGMA {
-            d.strength *= normalisation(place);
-        }
-    }
-    var stride = 1.0;
-    while sigma >= 2.0 * LEVEL_SIGMA && place.level + 1u < LEVELS {
-        place.level += 1u;
+// Chooses the level of resolution by the smallest standard deviation in pixels.
+fn choose_level(place: ptr<function, SplatPlace>, least: f32) {
+    var sigma = least;
+    while sigma >= 2.0 * LEVEL_SIGMA && (*place).level + 1u < LEVELS {
+        (*place).level += 1u;
         sigma *= 0.5;
-        stride *= 2.0;
+        (*place).center *= 0.5;
+        (*place).step_x *= 2.0;
+        (*place).step_y *= 2.0;
     }
-    place.center /= stride;
-    place.step_x *= stride;
-    place.step_y *= stride;
+}
+
+// Writes a footprint that is ready, and returns the peak of its irradiance.
+fn store(
+    index: u32,
+    d: Density,
+    gate: Gate,
+    object: u32,
+    flat: f32,
+    bounds: Bounds,
+    prepared: SplatPlace,
+) -> f32 {
+    var place = prepared;
+    let stride = exp2(f32(place.level));
     let level = view.levels[place.level];
     place.columns = pixel_range(bounds.low.x, bounds.high.x, stride, level.x);
     place.rows = pixel_range(bounds.low.y, bounds.high.y, stride, level.y);
     places[index] = place;
-    densities[index] = density_store(d);
+    var stored = density_store(d, gate, object);
+    stored.flat = flat;
+    densities[index] = stored;
     atomicAdd(&counts.by_level[place.level], 1u);
     return max(max(d.strength.x, d.strength.y), d.strength.z) * kernel_peak();
+}
+
+fn flux_of(record: FootprintRecord) -> vec3<f32> {
+    return vec3<f32>(record.flux_r, record.flux_g, record.flux_b);
+}
+
+fn covariance_of(record: FootprintRecord) -> Covariance {
+    let limit = view.max_anisotropy;
+    return covariance_of_axes(record.axis_u, record.axis_v, record.normal, view.scale, limit);
+}
+
+fn density_blurred(record: FootprintRecord, x: vec3<f32>, y: vec3<f32>) -> Density {
+    let tangent = tangent_of(record.normal);
+    let bitangent = bitangent_of(record.normal);
+    let variance = kernel_pixel_variance();
+    var c = covariance_of(record);
+    c = covariance_add(c, variance, dot(x, tangent), dot(x, bitangent));
+    c = covariance_add(c, variance, dot(y, tangent), dot(y, bitangent));
+    return density_spread(record.position, record.normal, record.incoming, flux_of(record), c);
+}
+
+// What other surfaces catch of a footprint whose plane is seen edge-on, or from behind. A plane that
+// is seen edge-on blurs its footprints by a pixel that is long on the plane, but not on what stands
+// before it. CPU twin: `Splat::before_plane`.
+fn prepare_before_plane(record: FootprintRecord, count: u32) -> f32 {
+    // Minus the direction of view.
+    var back = view.eye.xyz;
+    if view.eye.w != 0.0 {
+        let matrix = view.view_projection;
+        back = -vec3<f32>(matrix[0].w, matrix[1].w, matrix[2].w);
+    }
+    let axes = pixel_axes(record.position, normalize(back));
+    if !axes.is_valid {
+        return 0.0;
+    }
+    let up = towards_light(record.incoming, record.normal);
+    let d = density_blurred(
+        record,
+        axes.x - dot(axes.x, record.normal) * up,
+        axes.y - dot(axes.y, record.normal) * up,
+    );
+    if !(d.is_valid && is_finite_vector(record.position)) {
+        return 0.0;
+    }
+    let gate = gate_before(gate_of(density_reach(d)));
+    var bounds = bounds_of(d, vec2<f32>(gate.before, gate.reach));
+    if is_outside(bounds) {
+        return 0.0;
+    }
+    let reached = in_reach(d, gate, record.object, bounds);
+    if reached.heights.x > reached.heights.y {
+        return 0.0;
+    }
+    bounds = bounds_of(d, reached.heights);
+    if is_outside(bounds) {
+        return 0.0;
+    }
+    var place: SplatPlace;
+    place.shape = SHAPE_BOX;
+    place.step_x = vec2<f32>(dot(axes.x, d.u_gradient), dot(axes.x, d.v_gradient));
+    place.step_y = vec2<f32>(dot(axes.y, d.u_gradient), dot(axes.y, d.v_gradient));
+    choose_level(&place, least_sigma(place.step_x, place.step_y));
+    let index = count + atomicAdd(&counts.caught, 1u);
+    return store(index, d, gate, record.object, 0.0, bounds, place);
+}
+
+// Whether a footprint is integrated over pixels; then its place and its strength are made so.
+// CPU twin: `PixelIntegral::of`.
+fn is_integrated(
+    record: FootprintRecord,
+    axes: PixelAxes,
+    place: ptr<function, SplatPlace>,
+    d: ptr<function, Density>,
+) -> bool {
+    if view.integrate_pixels == 0u {
+        return false;
+    }
+    let tangent = tangent_of(record.normal);
+    let bitangent = bitangent_of(record.normal);
+    let x = vec2<f32>(dot(axes.x, tangent), dot(axes.x, bitangent));
+    let y = vec2<f32>(dot(axes.y, tangent), dot(axes.y, bitangent));
+    let area = x.x * y.y - x.y * y.x;
+    // The inverse of the matrix with columns x and y: rows of it.
+    let to_x = vec2<f32>(y.y, -y.x) / area;
+    let to_y = vec2<f32>(-x.y, x.x) / area;
+    let c = covariance_of(record);
+    let by_x = vec2<f32>(c.x * to_x.x + c.y * to_x.y, c.y * to_x.x + c.z * to_x.y);
+    let by_y = vec2<f32>(c.x * to_y.x + c.y * to_y.y, c.y * to_y.x + c.z * to_y.y);
+    let mapped = vec3<f32>(dot(to_x, by_x), dot(to_x, by_y), dot(to_y, by_y));
+    let g = pixel_gaussian((*place).center, mapped);
+    let extent = pixel_gaussian_extent(g);
+    let cosine = max(-dot(record.incoming, record.normal), MIN_INCIDENCE);
+    let strength = flux_of(record) / (abs(area) * cosine);
+    let is_small = covariance_eigenvalues(mapped).x < INTEGRATED_SIGMA * INTEGRATED_SIGMA
+        && max(extent.x, extent.y) < INTEGRATED_EXTENT;
+    if !(is_small && is_finite_vector(strength)) {
+        return false;
+    }
+    (*place).shape = SHAPE_INTEGRAL;
+    (*place).center = g.center;
+    (*place).step_x = vec2<f32>(g.long, g.slope);
+    (*place).step_y = vec2<f32>(g.short, g.strips);
+    // A pixel has at most all of the flux: as bright as the peak of this.
+    (*d).strength = strength / kernel_peak();
+    return true;
+}
+
+// Prepares one footprint and returns the peak of its irradiance, 0 if it is not splatted.
+fn prepare(index: u32, count: u32) -> f32 {
+    let record = footprints[index];
+    places[index].rows = 0u;
+    let to_eye = view.eye.xyz - view.eye.w * record.position;
+    let facing = dot(record.normal, to_eye) * inverseSqrt(dot(to_eye, to_eye));
+    var peak = 0.0;
+    if facing < LEAST_FACING {
+        peak = prepare_before_plane(record, count);
+    }
+    if facing <= 0.0 {
+        atomicAdd(&counts.turned_away, 1u);
+        return peak;
+    }
+    let axes = pixel_axes(record.position, record.normal);
+    var d: Density;
+    if axes.is_valid {
+        d = density_blurred(record, axes.x, axes.y);
+    } else {
+        d = density_blurred(record, vec3<f32>(0.0), vec3<f32>(0.0));
+    }
+    if !(d.is_valid && is_finite_vector(record.position)) {
+        atomicAdd(&counts.invalid, 1u);
+        return peak;
+    }
+    var gate = gate_of(density_reach(d));
+    if facing < LEAST_FACING {
+        gate = gate_own(gate);
+    }
+    var bounds = bounds_of(d, vec2<f32>(-gate.plane_distance, gate.reach));
+    if is_outside(bounds) {
+        atomicAdd(&counts.outside, 1u);
+        return peak;
+    }
+    let reached = in_reach(d, gate, record.object, bounds);
+    if reached.heights.x > reached.heights.y {
+        atomicAdd(&counts.hidden, 1u);
+        return peak;
+    }
+    let plane = bounds_of(d, vec2<f32>(0.0));
+    let is_linear = plane.is_exact && axes.is_valid;
+    var place: SplatPlace;
+    var sigma = 1e30;
+    if is_linear {
+        place.center = project(record.position).xy;
+        place.step_x = vec2<f32>(dot(axes.x, d.u_gradient), dot(axes.x, d.v_gradient));
+        place.step_y = vec2<f32>(dot(axes.y, d.u_gradient), dot(axes.y, d.v_gradient));
+        sigma = least_sigma(place.step_x, place.step_y);
+        if is_integrated(record, axes, &place, &d) {
+            let g = integral_of(place);
+            let middle = select(g.center.yx, g.center, g.strips < 0.0);
+            let extent = pixel_gaussian_extent(g);
+            atomicAdd(&counts.splatted, 1u);
+            let box = Bounds(middle - extent, middle + extent, true);
+            return peak + store(index, d, gate, record.object, 0.0, box, place);
+        }
+        if sigma < SMALL_SIGMA {
+            d.strength *= normalisation(place);
+        }
+    }
+    choose_level(&place, sigma);
+    let flat = 0.5 * exp2(f32(place.level)) / pixels_per_height(d);
+    let is_flat = reached.heights.x >= -flat && reached.heights.y <= flat;
+    if is_linear {
+        place.shape = select(SHAPE_BY_TILE, SHAPE_ELLIPSE, is_flat && reached.is_own);
+    } else {
+        place.shape = SHAPE_BOX;
+    }
+    bounds = plane;
+    if !is_flat {
+        bounds = bounds_of(d, reached.heights);
+    }
+    if is_outside(bounds) {
+        atomicAdd(&counts.outside, 1u);
+        return peak;
+    }
+    atomicAdd(&counts.splatted, 1u);
+    return peak + store(index, d, gate, record.object, flat, bounds, place);
 }
 
 @compute @workgroup_size(256)
@@ -190,7 +300,7 @@ fn splat_prepare(
     }
     var peak = 0.0;
     if id.x < count {
-        peak = prepare(id.x);
+        peak = prepare(id.x, count);
     }
     // The sum of a workgroup's peaks, in a fixed order.
     peaks[local] = peak;

@@ -26,9 +26,10 @@ const ROUNDED_BITS: f32 = 9.0;
 @group(0) @binding(6) var texels: texture_2d<u32>;
 @group(0) @binding(7) var<storage, read> splat_scale: SplatScale;
 @group(0) @binding(8) var estimate: texture_2d<f32>;
+@group(0) @binding(9) var objects: texture_2d<u32>;
 
 // Where `by_level` starts in `SplatCounts`, in words.
-const BY_LEVEL: u32 = 8u;
+const BY_LEVEL: u32 = 10u;
 
 struct Corner {
     @builtin(position) position: vec4<f32>,
@@ -41,6 +42,39 @@ fn drawn_stride() -> u32 {
         return sample_stride(level_counts[BY_LEVEL + quads.level]);
     }
     return 1u;
+}
+
+// A parallelogram around all pixels of a footprint, from its middle to the middles of its sides.
+struct Slanted {
+    middle: vec2<f32>,
+    u: vec2<f32>,
+    v: vec2<f32>,
+}
+
+fn slanted(place: SplatPlace) -> Slanted {
+    if place.shape == SHAPE_INTEGRAL {
+        let g = integral_of(place);
+        let is_wide = g.strips < 0.0;
+        // With a pixel to spare: a pixel is drawn if its middle is in it.
+        let along = INTEGRAL_CUT * g.long + 1.0;
+        let u = along * vec2<f32>(1.0, g.slope);
+        let v = vec2<f32>(0.0, INTEGRAL_CUT * g.short + 1.0 + abs(g.slope));
+        return Slanted(
+            select(g.center.yx, g.center, is_wide),
+            select(u.yx, u, is_wide),
+            select(v.yx, v, is_wide),
+        );
+    }
+    let determinant = place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x;
+    if place.shape == SHAPE_ELLIPSE && determinant != 0.0 {
+        // With a pixel to spare: a pixel's receiver need not lie under its middle.
+        let half = vec2<f32>(kernel_outer_reach()) + abs(place.step_x) + abs(place.step_y);
+        let u = vec2<f32>(place.step_y.y, -place.step_x.y) / determinant;
+        let v = vec2<f32>(-place.step_y.x, place.step_x.x) / determinant;
+        return Slanted(place.center, half.x * u, half.y * v);
+    }
+    // None that is smaller than the box.
+    return Slanted(place.center, vec2<f32>(1e9, 0.0), vec2<f32>(0.0, 1e9));
 }
 
 @vertex
@@ -58,18 +92,10 @@ fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     let rows = vec2<f32>(range_of(place.rows));
     // The box around it, or the slanted square around its ellipse where that is less.
     var at = vec2<f32>(mix(columns.x, columns.y, side.x), mix(rows.x, rows.y, side.y));
-    let determinant = place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x;
-    if place.is_local != 0u && determinant != 0.0 {
-        // With a pixel to spare: a pixel's receiver need not lie under its middle.
-        let half = vec2<f32>(kernel_outer_reach()) + abs(place.step_x) + abs(place.step_y);
-        let inverse_u = vec2<f32>(place.step_y.y, -place.step_x.y) / determinant;
-        let inverse_v = vec2<f32>(-place.step_y.x, place.step_x.x) / determinant;
-        let sized_u = half.x * inverse_u;
-        let sized_v = half.y * inverse_v;
-        let box = (columns.y - columns.x) * (rows.y - rows.x);
-        if 4.0 * abs(sized_u.x * sized_v.y - sized_u.y * sized_v.x) < box {
-            at = place.center + (2.0 * side.x - 1.0) * sized_u + (2.0 * side.y - 1.0) * sized_v;
-        }
+    let frame = slanted(place);
+    let box = (columns.y - columns.x) * (rows.y - rows.x);
+    if 4.0 * abs(frame.u.x * frame.v.y - frame.u.y * frame.v.x) < box {
+        at = frame.middle + (2.0 * side.x - 1.0) * frame.u + (2.0 * side.y - 1.0) * frame.v;
     }
     let ndc = vec2<f32>(2.0, -2.0) * at / size + vec2<f32>(-1.0, 1.0);
     return Corner(vec4<f32>(ndc, 0.5, 1.0), index);
@@ -96,13 +122,27 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
         return vec4<f32>(0.0);
     }
     let stored = densities[corner.index];
-    let weight = density_weight(
+    let position = bitcast<vec3<f32>>(texel.xyz);
+    let object = textureLoad(objects, vec2<i32>(corner.position.xy), 0).x;
+    let is_own = view.has_objects == 0u || object == stored.object;
+    let cosine = density_cosine(
         stored,
         decode_octahedral(stored.normal),
         stored_incoming(stored),
-        bitcast<vec3<f32>>(texel.xyz),
+        position,
         decode_octahedral(texel.w),
+        is_own,
     );
+    if cosine == 0.0 {
+        return vec4<f32>(0.0);
+    }
+    let place = places[corner.index];
+    var weight = cosine;
+    if place.shape == SHAPE_INTEGRAL {
+        weight *= kernel_peak() * pixel_gaussian_weight(integral_of(place), floor(corner.position.xy));
+    } else {
+        weight *= density_kernel(stored, position);
+    }
     let share = splat_scale.scale * weight * stored.strength;
     if QUADS_ROUNDING == 0u {
         return vec4<f32>(share, 0.0);

@@ -14,6 +14,8 @@
 @group(0) @binding(6) var texels: texture_2d<u32>;
 @group(0) @binding(7) var before: texture_2d_array<f32>;
 @group(0) @binding(8) var irradiance_out: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(9) var objects: texture_2d<u32>;
+@group(0) @binding(10) var<storage, read> surroundings: array<SurroundingTile>;
 
 // Footprints that fill up to so many pixels of a tile are summed by one thread each, larger ones by
 // all threads together, each for its pixel.
@@ -22,7 +24,8 @@ const SMALL_AREA: u32 = 64u;
 // Parts of the brightest footprint in which all are counted: 2^21 of them fit.
 const BOUND_PARTS: f32 = 2047.0;
 
-var<workgroup> positions: array<vec3<f32>, 256>;
+// Positions, as bits, and objects.
+var<workgroup> seen: array<vec4<u32>, 256>;
 var<workgroup> normals: array<vec3<f32>, 256>;
 var<workgroup> sums: array<atomic<u32>, 768>;
 var<workgroup> largest_bits: array<atomic<u32>, 3>;
@@ -39,20 +42,63 @@ fn clipped(place: SplatPlace, corner: vec2<u32>) -> vec4<u32> {
     return vec4<u32>(columns - corner.x, rows - corner.y);
 }
 
-// The pixels of a row of the tile that its ellipse covers, with one to spare on each side: a pixel's
-// receiver need not lie under its middle.
-fn row_span(place: SplatPlace, box: vec4<u32>, corner: vec2<u32>, row: u32) -> vec2<u32> {
-    if place.is_local == 0u {
+// The shape that a footprint has in the tile.
+fn shape_in_tile(place: SplatPlace, index: u32, its: vec2<u32>) -> u32 {
+    if place.shape != SHAPE_BY_TILE {
+        return place.shape;
+    }
+    let what = relation(surroundings[its.x], its.y != 0u, densities[index]);
+    return select(SHAPE_BOX, SHAPE_ELLIPSE, what == RELATION_FLAT);
+}
+
+// The pixels of a row of the tile that a footprint may light.
+fn row_span(
+    place: SplatPlace,
+    shape: u32,
+    box: vec4<u32>,
+    corner: vec2<u32>,
+    row: u32,
+) -> vec2<u32> {
+    let y = f32(corner.y + row);
+    var ends = vec2<f32>(0.0);
+    if shape == SHAPE_INTEGRAL {
+        ends = pixel_gaussian_span(integral_of(place), y, y + 1.0);
+    } else if shape == SHAPE_ELLIPSE {
+        // With a pixel to spare on each side: a pixel's receiver need not lie under its middle.
+        ends = ellipse_span(place, y + 0.5 - place.center.y)
+            + (place.center.x + vec2<f32>(-0.5, 0.5));
+    } else {
         return box.xy;
     }
-    let ends = ellipse_span(place, f32(corner.y + row) + 0.5 - place.center.y);
     if ends.y < ends.x {
         return vec2<u32>(box.x);
     }
-    let middle = place.center.x - f32(corner.x) - 0.5;
-    let low = clamp(floor(middle + ends.x), f32(box.x), f32(box.y));
-    let high = clamp(ceil(middle + ends.y) + 1.0, low, f32(box.y));
+    let places = ends - f32(corner.x);
+    let low = clamp(floor(places.x), f32(box.x), f32(box.y));
+    let high = clamp(ceil(places.y), low, f32(box.y));
     return vec2<u32>(u32(low), u32(high));
+}
+
+// What a footprint adds to a pixel, over its strength.
+fn weight_at(
+    stored: StoredDensity,
+    place: SplatPlace,
+    plane: vec3<f32>,
+    incoming: vec3<f32>,
+    at: vec4<u32>,
+    normal: vec3<f32>,
+    pixel: vec2<u32>,
+) -> f32 {
+    let position = bitcast<vec3<f32>>(at.xyz);
+    let is_own = view.has_objects == 0u || at.w == stored.object;
+    let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
+    if cosine == 0.0 {
+        return 0.0;
+    }
+    if place.shape == SHAPE_INTEGRAL {
+        return cosine * kernel_peak() * pixel_gaussian_weight(integral_of(place), vec2<f32>(pixel));
+    }
+    return cosine * density_kernel(stored, position);
 }
 
 @compute @workgroup_size(256)
@@ -64,16 +110,17 @@ fn splat_tiles(
     let corner = TILE * group.xy;
     let pixel = corner + vec2<u32>(local % TILE, local / TILE);
     let is_inside = all(pixel < level.xy);
-    var position = vec3<f32>(0.0);
+    var own_seen = vec4<u32>(0u);
     var normal = vec3<f32>(0.0);
     if is_inside {
         let texel = textureLoad(texels, vec2<i32>(pixel), 0);
         if texel.w != NO_RECEIVER {
-            position = bitcast<vec3<f32>>(texel.xyz);
+            let object = textureLoad(objects, vec2<i32>(pixel), 0).x;
+            own_seen = vec4<u32>(texel.xyz, object);
             normal = decode_octahedral(texel.w);
         }
     }
-    positions[local] = position;
+    seen[local] = own_seen;
     normals[local] = normal;
     if local == 0u {
         let tile = level.w + group.y * level.z + group.x;
@@ -133,15 +180,17 @@ fn splat_tiles(
         let room = 4294000000.0 - 2.0 * f32(count);
         let unit = select(vec3<f32>(0.0), room / bound, bound > vec3<f32>(0.0));
 
+        let its = surrounding_of_tile(step.level, group.xy);
         var own = vec3<u32>(0u);
         for (var base = range.x; base < range.y; base += 256u) {
             if base + local < range.y {
                 let index = pairs[base + local];
                 let place = places[index];
                 let box = clipped(place, corner);
+                let shape = shape_in_tile(place, index, its);
                 var area = 0u;
                 for (var y = box.z; y < box.w; y++) {
-                    let span = row_span(place, box, corner, y);
+                    let span = row_span(place, shape, box, corner, y);
                     area += span.y - span.x;
                 }
                 if area <= SMALL_AREA {
@@ -149,10 +198,13 @@ fn splat_tiles(
                     let plane = decode_octahedral(stored.normal);
                     let incoming = stored_incoming(stored);
                     for (var y = box.z; y < box.w; y++) {
-                        let span = row_span(place, box, corner, y);
+                        let span = row_span(place, shape, box, corner, y);
                         for (var x = span.x; x < span.y; x++) {
                             let at = TILE * y + x;
-                            let weight = density_weight(stored, plane, incoming, positions[at], normals[at]);
+                            let weight = weight_at(
+                                stored, place, plane, incoming,
+                                seen[at], normals[at], corner + vec2<u32>(x, y),
+                            );
                             if weight > 0.0 {
                                 let part = vec3<u32>(unit * stored.strength * weight + 0.5);
                                 atomicAdd(&sums[at], part.x);
@@ -171,7 +223,9 @@ fn splat_tiles(
                 let stored = densities[large[i]];
                 let plane = decode_octahedral(stored.normal);
                 let incoming = stored_incoming(stored);
-                let weight = density_weight(stored, plane, incoming, position, normal);
+                let weight = weight_at(
+                    stored, places[large[i]], plane, incoming, own_seen, normal, pixel,
+                );
                 own += vec3<u32>(unit * stored.strength * weight + 0.5);
             }
             workgroupBarrier();

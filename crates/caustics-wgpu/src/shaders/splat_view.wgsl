@@ -22,8 +22,15 @@ struct SplatView {
     // 0 for no limit.
     max_anisotropy: f32,
     has_objects: u32,
+    // Whether footprints as small as pixels are integrated over them.
+    integrate_pixels: u32,
+    surrounding_levels: u32,
+    pad_a: u32,
+    pad_b: u32,
     // Width, height, tiles across, first tile.
     levels: array<vec4<u32>, 8>,
+    // Levels of what tiles of the picture show: width, height, first tile.
+    surroundings: array<vec4<u32>, 12>,
 }
 
 // Rust mirror: `GpuSplatStep`.

@@ -5,18 +5,23 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::stage::Failure;
 use caustics::filter::Image;
-use caustics_benches::stage::Failure;
 
 /// Pictures of one scene, in a folder of their own that goes with this.
-pub(crate) struct Flip {
+#[derive(Debug)]
+pub struct Flip {
     folder: PathBuf,
     reference: PathBuf,
     tests: Vec<PathBuf>,
 }
 
 impl Flip {
-    pub(crate) fn new(reference: &Image) -> Result<Self, Failure> {
+    /// With the reference that the pictures are compared with.
+    ///
+    /// # Errors
+    /// If the folder cannot be written.
+    pub fn new(reference: &Image) -> Result<Self, Failure> {
         let folder = std::env::temp_dir().join(format!("scoreboard-{}", std::process::id()));
         fs::create_dir_all(&folder)?;
         let path = folder.join("reference.pfm");
@@ -28,7 +33,11 @@ impl Flip {
         })
     }
 
-    pub(crate) fn add(&mut self, name: &str, image: &Image) -> Result<(), Failure> {
+    /// Adds a picture.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add(&mut self, name: &str, image: &Image) -> Result<(), Failure> {
         let path = self.folder.join(format!("{name}.pfm"));
         write_pfm(&path, image)?;
         self.tests.push(path);
@@ -36,7 +45,8 @@ impl Flip {
     }
 
     /// FLIP of each picture in their order; nothing without Python or its packages.
-    pub(crate) fn evaluate(&self) -> Vec<Option<f64>> {
+    #[must_use]
+    pub fn evaluate(&self) -> Vec<Option<f64>> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/flip.py");
         let output = Command::new("python3")
             .arg(script)
