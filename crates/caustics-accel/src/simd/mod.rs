@@ -60,3 +60,21 @@ impl Dispatch {
         }
     }
 }
+
+/// Asks the processor to fetch a value that will be read soon.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(crate) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let start = std::ptr::from_ref(value).cast::<i8>();
+        for line in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: a hint without effect on memory, and the line lies within the value.
+            unsafe {
+                std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(
+                    start.add(line),
+                );
+            }
+        }
+    }
+}

@@ -1,4 +1,5 @@
 mod binary_tree;
+pub(crate) mod bundle;
 mod collapse;
 pub(crate) mod layout;
 mod refit;
