@@ -3,9 +3,11 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod lanes;
+mod prefetch;
 mod stack;
 
 pub(crate) use lanes::{Lanes, Row, WIDTH, next_lane};
+pub(crate) use prefetch::prefetch;
 pub(crate) use stack::Stack;
 
 use self::lanes::Portable;
@@ -57,24 +59,6 @@ impl Dispatch {
             Self::Portable => kernel.run(Portable),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(avx2) => avx2.run(kernel),
-        }
-    }
-}
-
-/// Asks the processor to fetch a value that will be read soon.
-#[inline(always)]
-#[allow(unsafe_code)]
-pub(crate) fn prefetch<T>(value: &T) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        let start = std::ptr::from_ref(value).cast::<i8>();
-        for line in (0..size_of::<T>()).step_by(64) {
-            // SAFETY: a hint without effect on memory, and the line lies within the value.
-            unsafe {
-                std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(
-                    start.add(line),
-                );
-            }
         }
     }
 }

@@ -1,9 +1,10 @@
 mod binary_tree;
 pub(crate) mod bundle;
 mod collapse;
+pub(crate) mod gather;
 pub(crate) mod layout;
 mod refit;
-mod stream;
+pub(crate) mod stream;
 pub(crate) mod traverse;
 
 use caustics_geometry::glam::{Vec3, Vec3A};

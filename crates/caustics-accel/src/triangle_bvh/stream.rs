@@ -2,18 +2,24 @@
 
 use caustics_geometry::{Hit, Ray};
 
-use super::bundle::{Gathered, Hull, highest};
-use super::layout::Child;
-use super::traverse::{
-    InPlace, STACK, Tree, child_of, closest_hit, entry, near_of, search,
-};
-use crate::simd::{Kernel, Lanes, Stack, WIDTH, next_lane};
-use crate::triangles::{ClosestRow, WIDEN};
+use super::bundle::{Bundle, Hull, greatest};
+use super::gather::{Gathered, are_compact};
+use super::layout::{Child, Node};
+use super::traverse::{InPlace, STACK, Tree, child_of, closest_hit, entry, near_of, search};
+use crate::simd::{Kernel, Lanes, Stack, WIDTH, next_lane, prefetch};
+use crate::triangles::{Block, ClosestRow, ShearedRow, WIDEN};
+
+/// Rows of rays in a large bundle, for rays that follow each other in squares ...
+const LARGE: usize = 8;
+/// ... and in a small one.
+const SMALL: usize = 2;
 
 /// When no more than this many rays meet a node, each goes on alone: then it is no more work.
 const ALONE: u32 = 3;
 
-const ROWS: usize = 2;
+/// When no more than this many rays of a row come to a leaf, each is tested alone against all of
+/// its triangles.
+const ALONE_IN_LEAF: u32 = 2;
 
 /// The closest hit of each ray.
 pub(super) struct ClosestHits<'a> {
@@ -27,108 +33,235 @@ impl Kernel for ClosestHits<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let all = self.rays.chunks(ROWS * WIDTH).zip(self.hits.chunks_mut(ROWS * WIDTH));
-        for (rays, hits) in all {
-            if rays.len() == ROWS * WIDTH && hits.len() == ROWS * WIDTH
-                && let Some(mut gathered) = Gathered::<ROWS>::new(lanes, rays)
-            {
-                trace(lanes, self.tree, rays, &mut gathered);
-                for (lane, hit) in hits.iter_mut().enumerate() {
-                    *hit = gathered.closest[lane / WIDTH].hit(lane % WIDTH);
-                }
-            } else {
+        trace_all(lanes, &self.tree, self.rays, self.hits);
+    }
+}
+
+/// What bundles are traced through.
+pub(crate) trait Stage<L: Lanes> {
+    /// The closest hits of rays that keep together.
+    fn trace_together<const ROWS: usize>(
+        &self,
+        lanes: L,
+        rays: &[Ray],
+        gathered: &mut Gathered<ROWS>,
+    );
+
+    /// The closest hit of one ray.
+    fn trace_alone(&self, lanes: L, ray: &Ray) -> Option<Hit>;
+}
+
+/// Traces the rays in as large bundles as keep together.
+#[inline(always)]
+pub(crate) fn trace_all<L: Lanes>(
+    lanes: L,
+    stage: &impl Stage<L>,
+    rays: &[Ray],
+    hits: &mut [Option<Hit>],
+) {
+    let mut large = Gathered::<LARGE>::new();
+    let mut small = Gathered::<SMALL>::new();
+    let size = LARGE * WIDTH;
+    for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
+        if are_compact(rays) && trace_bundle(lanes, stage, &mut large, rays, hits) {
+            continue;
+        }
+        let size = SMALL * WIDTH;
+        for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
+            if !trace_bundle(lanes, stage, &mut small, rays, hits) {
                 for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = closest_hit(lanes, self.tree, ray);
+                    *hit = stage.trace_alone(lanes, ray);
                 }
             }
         }
     }
 }
 
-/// Sends a bundle through the tree.
+/// Traces the rays if they keep together, and tells whether they do.
 #[inline(always)]
-fn trace<L: Lanes, const ROWS: usize>(
+fn trace_bundle<L: Lanes, const ROWS: usize>(
     lanes: L,
-    tree: Tree<'_>,
-    rays: &[Ray],
+    stage: &impl Stage<L>,
     gathered: &mut Gathered<ROWS>,
+    rays: &[Ray],
+    hits: &mut [Option<Hit>],
+) -> bool {
+    if !gathered.take(lanes, rays) {
+        return false;
+    }
+    stage.trace_together(lanes, rays, gathered);
+    for (hits, closest) in hits.chunks_mut(WIDTH).zip(&gathered.closest) {
+        for (lane, hit) in hits.iter_mut().enumerate() {
+            *hit = closest.hit(lane);
+        }
+    }
+    true
+}
+
+impl<L: Lanes> Stage<L> for Tree<'_> {
+    #[inline(always)]
+    fn trace_together<const ROWS: usize>(
+        &self,
+        lanes: L,
+        rays: &[Ray],
+        gathered: &mut Gathered<ROWS>,
+    ) {
+        let Gathered {
+            bundle,
+            sheared,
+            closest,
+        } = gathered;
+        let together = InPlaceTogether {
+            tree: *self,
+            rays,
+            bundle,
+            sheared,
+        };
+        search_together(lanes, self.nodes, self.root, bundle, &together, closest);
+    }
+
+    #[inline(always)]
+    fn trace_alone(&self, lanes: L, ray: &Ray) -> Option<Hit> {
+        closest_hit(lanes, *self, ray)
+    }
+}
+
+/// A bundle as the leaves of a tree meet it. Rays are numbered throughout all rows; a set of them
+/// has a bit for each.
+pub(crate) trait MeetTogether<L: Lanes, const ROWS: usize> {
+    /// Has the processor fetch what is read in a leaf.
+    fn fetch(&self, leaf: Child);
+
+    /// Looks for something closer in a leaf.
+    fn find_closest(&self, lanes: L, leaf: Child, active: u64, closest: &mut [ClosestRow; ROWS]);
+
+    /// Looks for something closer below a node, for one ray.
+    fn search_alone(&self, lanes: L, node: Child, ray: usize, closest: &mut ClosestRow);
+}
+
+/// A bundle and the triangles of a tree, both where the caller has them.
+struct InPlaceTogether<'a, const ROWS: usize> {
+    tree: Tree<'a>,
+    rays: &'a [Ray],
+    bundle: &'a Bundle<ROWS>,
+    sheared: &'a [ShearedRow; ROWS],
+}
+
+impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for InPlaceTogether<'_, ROWS> {
+    #[inline(always)]
+    fn fetch(&self, leaf: Child) {
+        fetch(self.tree.blocks, leaf);
+    }
+
+    #[inline(always)]
+    fn find_closest(&self, lanes: L, leaf: Child, active: u64, closest: &mut [ClosestRow; ROWS]) {
+        for block in &self.tree.blocks[leaf.blocks()] {
+            find_closest(lanes, block, 0, self.rays, self.sheared, active, closest);
+        }
+    }
+
+    #[inline(always)]
+    fn search_alone(&self, lanes: L, node: Child, ray: usize, closest: &mut ClosestRow) {
+        let (row, lane) = (ray / WIDTH, ray % WIDTH);
+        let in_place = InPlace {
+            slabs: self.bundle.rows[row].slabs(lanes, self.bundle.sides.near, lane),
+            sheared: &self.sheared[row].ray(lane),
+            blocks: self.tree.blocks,
+            ray: &self.rays[ray],
+        };
+        let mut alone = closest.get(lane, 0);
+        search(lanes, self.tree.nodes, node, &in_place, &mut alone);
+        closest.set(lane, &alone);
+    }
+}
+
+/// Has the processor fetch a leaf's first block; nearly all have no other.
+#[inline(always)]
+pub(crate) fn fetch(blocks: &[Block], leaf: Child) {
+    if let Some(block) = blocks.get(leaf.blocks().start) {
+        prefetch(block);
+    }
+}
+
+/// Looks for something closer in a block, whose primitives are numbered from `first`.
+#[inline(always)]
+pub(crate) fn find_closest<L: Lanes, const ROWS: usize>(
+    lanes: L,
+    block: &Block,
+    first: u32,
+    rays: &[Ray],
+    sheared: &[ShearedRow; ROWS],
+    active: u64,
+    closest: &mut [ClosestRow; ROWS],
 ) {
-    let Gathered {
-        bundle,
-        sheared,
-        closest,
-    } = gathered;
+    for row in 0..ROWS {
+        let mut met = (active >> (row * WIDTH)) as u32 & 255;
+        if met == 0 {
+            continue;
+        }
+        let (rays, sheared) = (&rays[row * WIDTH..][..WIDTH], &sheared[row]);
+        let closest = &mut closest[row];
+        if met.count_ones() > ALONE_IN_LEAF {
+            closest.find_closest(lanes, block, first, sheared, rays);
+            continue;
+        }
+        while met != 0 {
+            let lane = next_lane(&mut met);
+            let mut alone = closest.get(lane, first);
+            let block = std::slice::from_ref(block);
+            let ray = sheared.ray(lane);
+            ray.find_closest(lanes, block, 0..1, &rays[lane], &mut alone);
+            closest.set(lane, &alone);
+        }
+    }
+}
+
+/// Sends a bundle through what lies below one child.
+#[inline(always)]
+pub(crate) fn search_together<L: Lanes, const ROWS: usize>(
+    lanes: L,
+    nodes: &[Node],
+    start: Child,
+    bundle: &Bundle<ROWS>,
+    leaves: &impl MeetTogether<L, ROWS>,
+    closest: &mut [ClosestRow; ROWS],
+) {
     let hull = Hull::new(lanes, bundle);
     let mut farthest = farthest_limit(lanes, closest);
     let mut stack = Stack::<u64, STACK>::new();
-    let mut current = tree.root;
-    // Which rays meet the current child, a bit for each.
+    let mut current = start;
+    // Which rays meet the current child.
     let mut active = u64::MAX >> (64 - ROWS * WIDTH);
     loop {
         if current.is_leaf() {
-            for row in 0..ROWS {
-                let mut met = (active >> (row * WIDTH)) as u32 & 255;
-                if met == 0 {
-                    continue;
-                }
-                let rays = &rays[row * WIDTH..][..WIDTH];
-                if met.count_ones() > LEAF_ALONE {
-                    for block in &tree.blocks[current.blocks()] {
-                        closest[row].find_closest(lanes, block, 0, &sheared[row], rays);
-                    }
-                } else {
-                    while met != 0 {
-                        let lane = next_lane(&mut met);
-                        let mut alone = closest[row].get(lane, 0);
-                        sheared[row].ray(lane).find_closest(
-                            lanes,
-                            tree.blocks,
-                            current.blocks(),
-                            &rays[lane],
-                            &mut alone,
-                        );
-                        closest[row].set(lane, &alone);
-                    }
-                }
-            }
+            leaves.find_closest(lanes, current, active, closest);
             farthest = farthest_limit(lanes, closest);
         } else if active.count_ones() <= ALONE {
             while active != 0 {
-                let at = active.trailing_zeros() as usize % (ROWS * WIDTH);
+                let ray = active.trailing_zeros() as usize % (ROWS * WIDTH);
                 active &= active - 1;
-                let (row, lane) = (at / WIDTH, at % WIDTH);
-                let mut alone = closest[row].get(lane, 0);
-                let in_place = InPlace {
-                    slabs: bundle.slabs[row].slabs(lanes, bundle.near_side, lane),
-                    sheared: &sheared[row].ray(lane),
-                    blocks: tree.blocks,
-                    ray: &rays[at],
-                };
-                search(lanes, tree.nodes, current, &in_place, &mut alone);
-                closest[row].set(lane, &alone);
+                leaves.search_alone(lanes, current, ray, &mut closest[ray / WIDTH]);
             }
             farthest = farthest_limit(lanes, closest);
         } else {
             let index = current.index();
-            let node = &tree.nodes[index];
+            let node = &nodes[index];
             let (near, mut met) = hull.meet(lanes, node, lanes.splat(farthest));
             if met != 0 {
                 let near = lanes.store(near);
                 let mut pushed = 0;
                 while met != 0 {
                     let lane = next_lane(&mut met);
+                    // What waits is fetched while others are met: a bundle of rays knows early
+                    // what it will need, and that is what pays most in large meshes.
                     let child = node.children[lane];
                     if child.is_leaf() {
-                        if let Some(block) = tree.blocks.get(child.blocks().start) {
-                            crate::simd::prefetch(block);
-                        }
+                        leaves.fetch(child);
                     } else {
-                        crate::simd::prefetch(&tree.nodes[child.index()]);
+                        prefetch(&nodes[child.index()]);
                     }
-                    stack.insert(
-                        entry(near[lane], Child((index * WIDTH + lane) as u32)),
-                        pushed,
-                    );
+                    let place = Child((index * WIDTH + lane) as u32);
+                    stack.insert(entry(near[lane], place), pushed);
                     pushed += 1;
                 }
             }
@@ -142,11 +275,10 @@ fn trace<L: Lanes, const ROWS: usize>(
             }
             // An entry names the node and the lane: the box is needed once more.
             let place = child_of(next).index();
-            let node = &tree.nodes[place / WIDTH];
-            let lane = place % WIDTH;
+            let (node, lane) = (&nodes[place / WIDTH], place % WIDTH);
             active = 0;
-            for (i, row) in bundle.slabs.iter().enumerate() {
-                let met = row.meet(lanes, bundle.near_side, node, lane, &closest[i].limit);
+            for (i, (row, closest)) in bundle.rows.iter().zip(&*closest).enumerate() {
+                let met = row.meet(lanes, bundle.sides.near, node, lane, &closest.limit);
                 active |= u64::from(met) << (i * WIDTH);
             }
             if active != 0 {
@@ -157,9 +289,6 @@ fn trace<L: Lanes, const ROWS: usize>(
     }
 }
 
-/// Leaf test of rays alone up to so many.
-const LEAF_ALONE: u32 = 2;
-
 /// The largest limit of all, widened.
 #[inline(always)]
 fn farthest_limit<L: Lanes, const ROWS: usize>(lanes: L, rows: &[ClosestRow; ROWS]) -> f32 {
@@ -167,5 +296,5 @@ fn farthest_limit<L: Lanes, const ROWS: usize>(lanes: L, rows: &[ClosestRow; ROW
     for row in &rows[1..] {
         all = lanes.max(lanes.load(&row.limit), all);
     }
-    highest(lanes.store(all)) * WIDEN
+    greatest(lanes.store(all)) * WIDEN
 }

@@ -59,14 +59,20 @@ impl Closest {
     }
 }
 
+/// The three axes, the one along which a direction is longest last.
+#[inline(always)]
+pub(crate) fn axes_of(direction: Vec3) -> [usize; 3] {
+    let longest = direction.abs().max_position();
+    [(longest + 1) % 3, (longest + 2) % 3, longest]
+}
+
 impl ShearedRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
-        let longest = ray.direction.abs().max_position();
-        let axes = [(longest + 1) % 3, (longest + 2) % 3, longest];
-        let along = direction[longest];
+        let axes = axes_of(ray.direction);
+        let along = direction[axes[2]];
         Self {
             axes,
             origin: axes.map(|axis| origin[axis]),

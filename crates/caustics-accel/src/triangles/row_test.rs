@@ -1,9 +1,10 @@
 //! Eight rays against one triangle after the other.
 
+use caustics_geometry::glam::Vec3;
 use caustics_geometry::{Hit, Ray};
 
 use super::block::Block;
-use super::leaf_test::{Closest, ShearedRay, Sheared, hit_vanishing, load, splat};
+use super::leaf_test::{Closest, Sheared, ShearedRay, axes_of, hit_vanishing, load, splat};
 use crate::simd::{Lanes, Row, WIDTH, next_lane};
 
 /// Eight rays for Woop's test, whose directions are longest along the same axis: to the bit what
@@ -11,9 +12,9 @@ use crate::simd::{Lanes, Row, WIDTH, next_lane};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRow {
     pub(crate) axes: [usize; 3],
-    pub(crate) origin: [Row; 3],
-    pub(crate) shear: [Row; 3],
-    pub(crate) t_min: Row,
+    origin: [Row; 3],
+    shear: [Row; 3],
+    t_min: Row,
 }
 
 /// The closest hits so far of eight rays.
@@ -30,12 +31,54 @@ pub(crate) struct ClosestRow {
 const NO_PRIMITIVE: f32 = f32::from_bits(u32::MAX);
 
 impl ShearedRow {
-    pub(crate) const EMPTY: Self = Self {
-        axes: [0; 3],
-        origin: [[0.0; WIDTH]; 3],
-        shear: [[0.0; WIDTH]; 3],
-        t_min: [0.0; WIDTH],
-    };
+    /// Without rays yet, for such as go along the same axis as this direction.
+    pub(crate) fn along(direction: Vec3) -> Self {
+        Self {
+            axes: axes_of(direction),
+            origin: [[0.0; WIDTH]; 3],
+            shear: [[0.0; WIDTH]; 3],
+            t_min: [0.0; WIDTH],
+        }
+    }
+
+    /// Sets the rays: which of them go along the axis.
+    #[inline(always)]
+    pub(crate) fn set<L: Lanes>(
+        &mut self,
+        lanes: L,
+        origin: &[Row; 3],
+        direction: &[Row; 3],
+        t_min: Row,
+    ) -> L::Mask {
+        let [x, y, z] = self.axes;
+        let [along_x, along_y, along_z] =
+            load(lanes, [&direction[x], &direction[y], &direction[z]]);
+        self.origin = [origin[x], origin[y], origin[z]];
+        self.shear = [
+            lanes.store(lanes.div(along_x, along_z)),
+            lanes.store(lanes.div(along_y, along_z)),
+            lanes.store(lanes.div(lanes.splat(1.0), along_z)),
+        ];
+        self.t_min = t_min;
+        let zero = lanes.splat(0.0);
+        let [size_x, size_y, size_z] = [
+            lanes.max(along_x, lanes.sub(zero, along_x)),
+            lanes.max(along_y, lanes.sub(zero, along_y)),
+            lanes.max(along_z, lanes.sub(zero, along_z)),
+        ];
+        // Of components of the same size the first one counts, as for `ShearedRay`.
+        let beyond_x = if x < z {
+            lanes.less(size_x, size_z)
+        } else {
+            lanes.at_most(size_x, size_z)
+        };
+        let beyond_y = if y < z {
+            lanes.less(size_y, size_z)
+        } else {
+            lanes.at_most(size_y, size_z)
+        };
+        lanes.and(beyond_x, beyond_y)
+    }
 
     /// One of the rays.
     #[inline(always)]
@@ -58,6 +101,12 @@ impl ClosestRow {
         v: [0.0; WIDTH],
         primitive: [NO_PRIMITIVE; WIDTH],
     };
+
+    /// For other rays.
+    #[inline(always)]
+    pub(crate) fn forget(&mut self) {
+        self.primitive = [NO_PRIMITIVE; WIDTH];
+    }
 
     #[inline(always)]
     pub(crate) fn hit(&self, lane: usize) -> Option<Hit> {
