@@ -11,8 +11,28 @@ use crate::triangles::{ClosestRow, ShearedRow, axes_of};
 /// Squared sine of the largest angle between a bundle's rays and its first: about 5 degrees.
 const SPREAD_SQUARED: f32 = 0.0075;
 
+/// Eight rays by component.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayRow {
+    pub(crate) origin: [Row; 3],
+    pub(crate) direction: [Row; 3],
+    /// As [`lower_end`](crate::triangles::lower_end) has it.
+    pub(crate) t_min: Row,
+    t_max: Row,
+}
+
+impl RayRow {
+    const EMPTY: Self = Self {
+        origin: [[0.0; WIDTH]; 3],
+        direction: [[0.0; WIDTH]; 3],
+        t_min: [0.0; WIDTH],
+        t_max: [0.0; WIDTH],
+    };
+}
+
 /// Rays of a stream that keep together, as boxes and leaves meet them, and what they have hit.
 pub(crate) struct Gathered<const ROWS: usize> {
+    pub(crate) world: [RayRow; ROWS],
     pub(crate) bundle: Bundle<ROWS>,
     pub(crate) sheared: [ShearedRow; ROWS],
     pub(crate) closest: [ClosestRow; ROWS],
@@ -23,6 +43,7 @@ impl<const ROWS: usize> Gathered<ROWS> {
     pub(crate) fn new() -> Self {
         let any = Vec3::Z;
         Self {
+            world: [RayRow::EMPTY; ROWS],
             bundle: Bundle::new(Sides::new(any.to_array())),
             sheared: [ShearedRow::along(any); ROWS],
             closest: [ClosestRow::NONE; ROWS],
@@ -56,34 +77,29 @@ impl<const ROWS: usize> Gathered<ROWS> {
     /// Sets a row; whether all of its rays keep to the first one.
     #[inline(always)]
     fn fill<L: Lanes>(&mut self, lanes: L, row: usize, rays: &[Ray], first: Vec3) -> bool {
-        let mut origins = [[0.0; WIDTH]; 3];
-        let mut directions = [[0.0; WIDTH]; 3];
-        let [mut t_min, mut t_max] = [[0.0; WIDTH]; 2];
+        let world = &mut self.world[row];
         self.closest[row].forget();
         let limit = &mut self.closest[row].limit;
         for (lane, ray) in rays.iter().enumerate().take(WIDTH) {
             for axis in 0..3 {
-                origins[axis][lane] = ray.origin[axis];
-                directions[axis][lane] = ray.direction[axis];
+                world.origin[axis][lane] = ray.origin[axis];
+                world.direction[axis][lane] = ray.direction[axis];
             }
-            t_min[lane] = ray.t_min;
-            t_max[lane] = ray.t_max;
+            world.t_min[lane] = ray.t_min;
+            world.t_max[lane] = ray.t_max;
             limit[lane] = ray.t_max.next_down();
         }
         let zero = lanes.splat(0.0);
-        // As `lower_end` has it.
-        let t_min = lanes.add(lanes.max(lanes.load(&t_min), zero), zero);
-        let d = load(lanes, &directions);
-        let mut fit = self
-            .bundle
-            .set(lanes, row, &load(lanes, &origins), &d, zero);
-        fit = lanes.and(fit, lanes.less(t_min, lanes.load(&t_max)));
-        let t_min = lanes.store(t_min);
-        self.bundle.rows[row].t_min = t_min;
-        fit = lanes.and(
-            fit,
-            self.sheared[row].set(lanes, &origins, &directions, t_min),
-        );
+        let t_min = lanes.add(lanes.max(lanes.load(&world.t_min), zero), zero);
+        let t_max = lanes.load(&world.t_max);
+        let (o, d) = (load(lanes, &world.origin), load(lanes, &world.direction));
+        world.t_min = lanes.store(t_min);
+        let bundle = &mut self.bundle;
+        bundle.rows[row].t_min = world.t_min;
+        let mut fit = bundle.set(lanes, row, &o, &d, zero);
+        fit = lanes.and(fit, lanes.less(t_min, t_max));
+        let is_along = self.sheared[row].set(lanes, &world.origin, &world.direction, world.t_min);
+        fit = lanes.and(fit, is_along);
         let one = splat(lanes, first.to_array());
         let across = [
             difference(lanes, d[1], one[2], d[2], one[1]),

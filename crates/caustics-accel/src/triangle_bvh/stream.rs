@@ -110,6 +110,7 @@ impl<L: Lanes> Stage<L> for Tree<'_> {
             bundle,
             sheared,
             closest,
+            ..
         } = gathered;
         let together = InPlaceTogether {
             tree: *self,
@@ -202,7 +203,7 @@ pub(crate) fn find_closest<L: Lanes, const ROWS: usize>(
         let (rays, sheared) = (&rays[row * WIDTH..][..WIDTH], &sheared[row]);
         let closest = &mut closest[row];
         if met.count_ones() > ALONE_IN_LEAF {
-            closest.find_closest(lanes, block, first, sheared, rays);
+            closest.find_closest(lanes, block, first, sheared, rays, met);
             continue;
         }
         while met != 0 {

@@ -138,7 +138,8 @@ impl ClosestRow {
         }
     }
 
-    /// Tests all triangles of a block. Numbers of primitives count from `first`.
+    /// Tests all triangles of a block for the rays of `active`, a bit for each. Numbers of primitives
+    /// count from `first`.
     #[inline(always)]
     pub(crate) fn find_closest<L: Lanes>(
         &mut self,
@@ -147,6 +148,7 @@ impl ClosestRow {
         first: u32,
         sheared: &ShearedRow,
         rays: &[Ray],
+        active: u32,
     ) {
         let ray = Sheared {
             origin: load(lanes, sheared.origin.each_ref()),
@@ -166,14 +168,15 @@ impl ClosestRow {
             ];
             let limit = lanes.load(&self.limit);
             let found = ray.hit(lanes, &vertices, limit);
-            if found.lanes | found.vanishing == 0 {
+            let (hit, vanishing) = (found.lanes & active, found.vanishing & active);
+            if hit | vanishing == 0 {
                 continue;
             }
             let primitive = block.primitives[lane] + first;
             let u = lanes.div(found.b, found.sum);
             let v = lanes.div(found.c, found.sum);
             let nearer = lanes.and(found.met, lanes.less(found.t, limit));
-            if found.vanishing == 0 && lanes.bits(nearer) == found.lanes {
+            if vanishing == 0 && lanes.bits(nearer) == hit {
                 let number = lanes.splat(f32::from_bits(primitive));
                 let old = lanes.load(&self.u);
                 self.u = lanes.store(lanes.select(nearer, u, old));
@@ -183,15 +186,14 @@ impl ClosestRow {
                 self.primitive = lanes.store(lanes.select(nearer, number, old));
                 self.limit = lanes.store(lanes.select(nearer, found.t, limit));
             } else {
-                self.offer_each(
-                    found.lanes,
-                    found.vanishing,
-                    &[lanes.store(found.t), lanes.store(u), lanes.store(v)],
-                    block,
-                    lane,
-                    first,
-                    rays,
-                );
+                let candidates = Candidates {
+                    hit,
+                    vanishing,
+                    t: lanes.store(found.t),
+                    u: lanes.store(u),
+                    v: lanes.store(v),
+                };
+                self.offer_each(&candidates, block, lane, first, rays);
             }
         }
     }
@@ -201,14 +203,14 @@ impl ClosestRow {
     #[inline(never)]
     fn offer_each(
         &mut self,
-        mut hit: u32,
-        mut vanishing: u32,
-        [t, u, v]: &[Row; 3],
+        candidates: &Candidates,
         block: &Block,
         triangle: usize,
         first: u32,
         rays: &[Ray],
     ) {
+        let Candidates { t, u, v, .. } = candidates;
+        let (mut hit, mut vanishing) = (candidates.hit, candidates.vanishing);
         while hit != 0 {
             let lane = next_lane(&mut hit);
             let mut closest = self.get(lane, first);
@@ -229,4 +231,15 @@ impl ClosestRow {
             }
         }
     }
+}
+
+/// What a triangle's test found for eight rays.
+struct Candidates {
+    /// Rays that hit it.
+    hit: u32,
+    /// Rays for which edge functions are too small to tell.
+    vanishing: u32,
+    t: Row,
+    u: Row,
+    v: Row,
 }
