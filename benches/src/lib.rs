@@ -5,6 +5,8 @@ pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod meshes;
+#[cfg(feature = "nanoflann-cpp")]
+pub mod nanoflann_cpp;
 pub mod peers;
 pub mod photons;
 pub mod random;
