@@ -7,16 +7,9 @@ use caustics_sampling::warp::{
 use caustics_scene::{Light, World};
 use glam::{Vec2, Vec3};
 
+use crate::differential::BLUR_EDGE;
 use crate::domain::to_world;
 use crate::emission::{Emission, EmissionSample, differential};
-
-/// How wide a photon's share is taken, of a four-dimensional cell that no other has.
-///
-/// A receiver sees two dimensions of the four: on it, as many photons overlap as there are places
-/// on the light, so that each may be narrower than the cell without leaving gaps. Of widths from
-/// 0.07 to 1, this one had the least error under a square lamp over a glass sphere, at 65,536
-/// photons (6 times less than the whole cell) and at 262,144 (7 times).
-pub(crate) const NARROWING: f32 = 0.2;
 
 /// A surface that emits the same radiance everywhere and in all directions of one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -263,7 +256,7 @@ impl AreaSurface {
 ///
 /// The four parameters of its differential are those of the direction, from a place held still, and
 /// those of the place, with the direction held still: neighbours among all rays, whatever cone each
-/// place has.
+/// place has. Directions are the lattice's steps; places are what blurs, by [`BLUR_EDGE`].
 pub(crate) fn emit<const N: usize>(
     world: &World,
     surface: &AreaSurface,
@@ -280,25 +273,18 @@ pub(crate) fn emit<const N: usize>(
     }
     let area = surface.area(world);
     let share = 1.0 / sample.count as f32;
-    let across_target = target.map_or(0.0, |sphere| {
-        let distance = sphere.center.distance(place.spawn.position);
-        solid_angle * distance * distance
-    });
-    let cell = Cell::balanced(area, across_target, share);
+    let step = share.sqrt();
     let (positions, directions) = match place.derivatives {
         Some(moved) => {
             let turned = [warped.d_du, warped.d_dv];
-            (
-                moved.map(|it| cell.place_edge * it),
-                turned.map(|it| cell.direction_edge * it),
-            )
+            (moved.map(|it| BLUR_EDGE * it), turned.map(|it| step * it))
         }
         // The places of an object jump from triangle to triangle: as wide a square instead.
         None => {
             let (tangent, bitangent) = direction.any_orthonormal_pair();
             let frame = Frame::from_normal(place.normal);
-            let length = cell.place_edge * area.sqrt();
-            let angle = cell.direction_edge * solid_angle.sqrt();
+            let length = BLUR_EDGE * area.sqrt();
+            let angle = step * solid_angle.sqrt();
             (
                 [length * frame.tangent, length * frame.bitangent],
                 [angle * tangent, angle * bitangent],
@@ -342,31 +328,4 @@ pub(crate) fn cone_to(sphere: &Sphere, origin: Vec3) -> Option<(Vec3, Cone)> {
     Cone::from_sine(sphere.radius / distance)
         .ok()
         .map(|cone| (to_sphere / distance, cone))
-}
-
-/// How far apart photons stand in the unit squares of places and of directions.
-struct Cell {
-    place_edge: f32,
-    direction_edge: f32,
-}
-
-impl Cell {
-    /// Of the four-dimensional domain each photon has one `share`, which may be long in one pair of
-    /// dimensions and short in the other. The two blur a caustic alike when the light's spacing is
-    /// as wide as the spacing of directions is at the target, whose cross-section is
-    /// `across_target` square metres.
-    fn balanced(area: f32, across_target: f32, share: f32) -> Self {
-        let balanced = (area / (across_target * share)).sqrt();
-        // As if from so many places on the light, each with so many directions.
-        let places = if balanced.is_finite() {
-            balanced
-        } else {
-            share.sqrt().recip()
-        };
-        let places = places.clamp(1.0, share.recip());
-        Self {
-            place_edge: NARROWING * places.sqrt().recip(),
-            direction_edge: NARROWING * (places * share).sqrt(),
-        }
-    }
 }

@@ -146,7 +146,7 @@ pub use area_emission::AreaSurface;
 pub use casters::{Casters, MAX_CASTERS};
 pub use compact::{CompactFootprint, CompactPhoton};
 pub use culling::{Culling, ViewVolume};
-pub use differential::RayDifferential;
+pub use differential::{BLUR_EDGE, RayDifferential};
 pub use domain::EmissionDomain;
 pub use emission::{Emission, EmissionSample};
 pub use emitter::{Emitter, LightSource};

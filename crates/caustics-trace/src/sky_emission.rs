@@ -5,33 +5,31 @@ use caustics_sampling::warp::square_to_disc_concentric;
 use caustics_scene::Environment;
 use glam::Vec2;
 
-use crate::area_emission::NARROWING;
+use crate::differential::BLUR_EDGE;
 use crate::emission::{Emission, EmissionSample, differential};
 
 /// A photon from the sky, from a direction by importance, at a place that is even over the
 /// cross-section of the target.
 ///
-/// Of its four-dimensional cell it has as much in direction as blurs a caustic as far as its part in
-/// position does, at a distance of the target's own radius: where a bright spot of the sky is sampled
-/// finely, most of the cell is position's, as for a sun.
+/// Positions are the lattice's steps, as for a sun; directions, a [`BLUR_EDGE`] of the square that the
+/// inverse of their density spans, are what blurs: little where the sky has a bright spot.
 pub(crate) fn emit<const N: usize>(
     sky: &Environment,
     target: &Sphere,
     distance: f32,
     sample: &EmissionSample,
 ) -> Option<Emission<N>> {
-    let from = sky.sample(sample.point);
+    let from = sky.sample(sample.place);
     if !(from.pdf > 0.0 && from.pdf.is_finite()) {
         return None;
     }
     let frame = Frame::from_normal(from.towards);
     let across = |it: Vec2| frame.to_world((target.radius * it).extend(0.0));
-    let place = square_to_disc_concentric(sample.place);
+    let place = square_to_disc_concentric(sample.point);
     let area = PI * target.radius * target.radius;
     let count = sample.count as f32;
-    let places = (count * PI * from.pdf).sqrt().clamp(1.0, count);
-    let edge = NARROWING * places.sqrt().recip();
-    let angle = NARROWING * (places / (from.pdf * count)).sqrt();
+    let edge = count.sqrt().recip();
+    let angle = BLUR_EDGE * from.pdf.sqrt().recip();
     Some(Emission {
         ray: Ray::new(
             target.center + distance * from.towards + across(place.value),

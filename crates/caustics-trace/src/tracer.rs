@@ -4,7 +4,6 @@ use caustics_sampling::CounterRng;
 use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
 
-use crate::area_emission::NARROWING;
 use crate::casters::Casters;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
@@ -60,12 +59,6 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
-    const DIRECTION_CHANGE_LIMIT: f32 = if N > 2 {
-        NARROWING * DIRECTION_CHANGE_LIMIT
-    } else {
-        DIRECTION_CHANGE_LIMIT
-    };
-
     pub(crate) fn new(world: &'a World, intersect: &'a I, options: &'a TraceOptions) -> Self {
         Self {
             world,
@@ -339,7 +332,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         let differential = self
             .scattered(branch, point, outgoing)
             .scaled(1.0 / if N > 2 { root.sqrt() } else { root });
-        let (differential, shortened) = differential.bounded(Self::DIRECTION_CHANGE_LIMIT);
+        let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {
             FootprintSource::Thinned

@@ -1,8 +1,5 @@
 // Photons from surfaces that shine. Twin: area_emission.rs in caustics-trace.
 
-// How wide a photon's share is taken of a four-dimensional cell. Twin: `NARROWING`.
-const NARROWING: f32 = 0.2;
-
 // Below it a cone's height is too small for f32. Twin: `LEAST_HEIGHT` in cone.rs.
 const LEAST_HEIGHT: f32 = 1e-30;
 
@@ -120,35 +117,25 @@ fn emit_from_area(emitter: u32, sample: EmissionSample) -> Emission {
         return emission;
     }
 
-    // Of the four-dimensional domain each photon has one share: as if from so many places on the
-    // light, each with so many directions. Twin: `Cell::balanced`.
     let area = trace.emitters[emitter].area;
     let share = trace.emitters[emitter].share;
-    let reach = select(0.0, distance, trace.emitters[emitter].target_radius > 0.0);
-    let across_target = solid_angle * reach * reach;
-    var places = 1.0 / sqrt(share);
-    if across_target * share > 0.0 {
-        places = sqrt(area / (across_target * share));
-    }
-    places = clamp(places, 1.0, 1.0 / share);
-    let place_edge = NARROWING * (1.0 / sqrt(places));
-    let direction_edge = NARROWING * sqrt(places * share);
+    let step = sqrt(share);
 
     emission.ray = Ray(origin_towards(place.spawn, normal, direction), direction);
     emission.flux = trace.emitters[emitter].intensity * (cosine * solid_angle * area * share);
     emission.is_valid = true;
     if PARAMETERS == 4u {
         if place.has_derivatives {
-            emission.differential.direction[0] = direction_edge * warped.d_du;
-            emission.differential.direction[1] = direction_edge * warped.d_dv;
-            emission.differential.position[PARAMETERS - 2u] = place_edge * place.d_du;
-            emission.differential.position[PARAMETERS - 1u] = place_edge * place.d_dv;
+            emission.differential.direction[0] = step * warped.d_du;
+            emission.differential.direction[1] = step * warped.d_dv;
+            emission.differential.position[PARAMETERS - 2u] = BLUR_EDGE * place.d_du;
+            emission.differential.position[PARAMETERS - 1u] = BLUR_EDGE * place.d_dv;
         } else {
             // The places of an object jump from triangle to triangle: as wide a square instead.
             let turns = tangents_of(direction);
             let moves = tangents_of(normal);
-            let length = place_edge * sqrt(area);
-            let angle = direction_edge * sqrt(solid_angle);
+            let length = BLUR_EDGE * sqrt(area);
+            let angle = step * sqrt(solid_angle);
             emission.differential.direction[0] = angle * turns.first;
             emission.differential.direction[1] = angle * turns.second;
             emission.differential.position[PARAMETERS - 2u] = length * moves.first;

@@ -1,6 +1,11 @@
 // How a ray changes with the parameters of its emission (Igehy 1999). Twin: differential.rs in
 // caustics-trace.
 
+// Twins: those of differential.rs.
+const BLUR_EDGE: f32 = 0.125;
+const OVERLAP: f32 = 3.0;
+const LEAST_AREA: f32 = 0.01;
+
 struct Differential {
     position: array<vec3<f32>, PARAMETERS>,
     direction: array<vec3<f32>, PARAMETERS>,
@@ -114,7 +119,6 @@ fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2
     if PARAMETERS == 2u {
         return array(at_end.position[0], at_end.position[1]);
     }
-    let tangents = tangents_of(normal);
     var scale = 0.0;
     for (var i = 0u; i < PARAMETERS; i++) {
         scale = max(scale, largest(abs(at_end.position[i])));
@@ -122,26 +126,15 @@ fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2
     if scale == 0.0 {
         return array(vec3(0.0), vec3(0.0));
     }
-    var xx = 0.0;
-    var xy = 0.0;
-    var yy = 0.0;
-    for (var i = 0u; i < PARAMETERS; i++) {
-        let moved = at_end.position[i] / scale;
-        let x = dot(moved, tangents.first);
-        let y = dot(moved, tangents.second);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-    }
-    // The columns of the covariance's Cholesky factor.
-    let x = sqrt(xx);
-    var shear = 0.0;
-    if x > 0.0 {
-        shear = xy / x;
-    }
-    let y = sqrt(max(yy - shear * shear, 0.0));
-    return array(
-        scale * (x * tangents.first + shear * tangents.second),
-        scale * y * tangents.second,
-    );
+    let step = area_of(at_end.position[0] / scale, at_end.position[1] / scale);
+    let blur = area_of(
+        at_end.position[PARAMETERS - 2u] / scale, at_end.position[PARAMETERS - 1u] / scale);
+    let edge = scale * sqrt(step + OVERLAP * sqrt(step * blur));
+    let tangents = tangents_of(normal);
+    return array(edge * tangents.first, edge * tangents.second);
+}
+
+fn area_of(one: vec3<f32>, other: vec3<f32>) -> f32 {
+    let squares = dot(one, one) + dot(other, other);
+    return max(length_of(cross(one, other)), LEAST_AREA * squares);
 }

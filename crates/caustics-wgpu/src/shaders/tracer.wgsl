@@ -114,8 +114,7 @@ fn follow(
         differential = scaled_by(
             differential, 1.0 / select(sqrt(root), root, PARAMETERS == 2u));
     }
-    let limit = DIRECTION_CHANGE_LIMIT * select(NARROWING, 1.0, PARAMETERS == 2u);
-    let shortened = bounded(differential, limit);
+    let shortened = bounded(differential, DIRECTION_CHANGE_LIMIT);
     count_up(COUNTER_BOUNDED, select(0u, 1u, shortened.shortened));
     let origin = origin_towards(point.spawn, point.geometric_normal, outgoing.direction);
     let object = bodies[point.body].object;
