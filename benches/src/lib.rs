@@ -6,6 +6,8 @@ pub mod document;
 pub mod embree;
 pub mod flip;
 pub mod meshes;
+#[cfg(feature = "nanoflann-cpp")]
+pub mod nanoflann_cpp;
 pub mod peers;
 pub mod photons;
 pub mod random;

@@ -114,9 +114,64 @@ proptest! {
         let instances = places.iter().map(|&at| placed(&tree, at)).collect();
         let ours = InstanceBvh::new(instances, instructions).unwrap();
         let reference = bvh_of(&flat);
-        for ray in rays_at(&flat.0, &flat.1, aims) {
+        let rays = rays_at(&flat.0, &flat.1, aims);
+        // Rays from one of them to where the others go: many in a bundle.
+        let fan: Vec<Ray> = rays
+            .iter()
+            .take(64)
+            .map(|ray| Ray { direction: rays[0].direction + 0.05 * ray.direction, ..rays[0] })
+            .collect();
+        let mut streamed = vec![None; fan.len()];
+        ours.closest_hits(&fan, &mut streamed);
+        for (ray, hit) in fan.iter().zip(streamed) {
+            prop_assert_eq!(ours.closest_hit(ray), hit, "{:?}", ray);
+        }
+        for ray in rays {
             prop_assert_eq!(ours.closest_hit(&ray), reference.closest_hit(&ray), "{:?}", ray);
             prop_assert_eq!(ours.is_occluded(&ray), reference.is_occluded(&ray), "{:?}", ray);
+        }
+    }
+}
+
+/// Lattices of rays over spheres in many places, so that the ways of a bundle lead into several of
+/// them, and in some it enters boxes by different sides.
+#[test]
+fn streams_find_what_single_rays_find() {
+    let tree = bvh_of(&icosphere(3, Vec3::ZERO));
+    let instances: Vec<BvhInstance> = (0..60_u32)
+        .map(|i| {
+            let turn = Quat::from_euler(Default::default(), 0.3 * i as f32, 1.1, -2.0);
+            let mirror = if i % 3 == 0 { -1.0 } else { 1.0 };
+            let scale = Vec3::new(mirror, 1.0, 0.3 + 0.02 * i as f32);
+            let shift = Vec3::new((i % 8) as f32, (i / 8) as f32, (i % 5) as f32);
+            let transform = Affine3A::from_scale_rotation_translation(0.6 * scale, turn, shift);
+            placed(&tree, transform)
+        })
+        .collect();
+    for instructions in [Instructions::Detect, Instructions::Portable] {
+        let ours = InstanceBvh::new(instances.clone(), instructions).unwrap();
+        let light = Vec3::new(3.1, 4.2, 30.0);
+        let towards = |(x, y): (u32, u32)| {
+            let target = Vec3::new(x as f32 / 16.0 - 0.5, y as f32 / 16.0 - 0.5, 0.0);
+            (light, target - light)
+        };
+        let along = |(x, y): (u32, u32)| {
+            let from = Vec3::new(x as f32 / 16.0 - 0.5, y as f32 / 16.0 - 0.5, 9.0);
+            (from, Vec3::NEG_Z)
+        };
+        let in_rows = (0..16_384_u32).map(|i| (i % 128, i / 128));
+        let sets: [Vec<(Vec3, Vec3)>; 3] = [
+            common::morton_cells(7).map(towards).collect(),
+            common::morton_cells(7).map(along).collect(),
+            in_rows.map(towards).collect(),
+        ];
+        for set in sets {
+            let rays: Vec<Ray> = set.iter().map(|&(from, way)| Ray::new(from, way)).collect();
+            let single: Vec<_> = rays.iter().map(|ray| ours.closest_hit(ray)).collect();
+            assert!(single.iter().flatten().count() > 5000);
+            let mut streamed = vec![None; rays.len()];
+            ours.closest_hits(&rays, &mut streamed);
+            assert_eq!(single, streamed);
         }
     }
 }

@@ -68,7 +68,7 @@ fn fans() -> impl Strategy<Value = (Vec<Vec3>, Vec<Vec3>)> {
         prop_oneof![Just(0.0_f32), Just(0.01), Just(0.05), Just(0.5)],
         prop_oneof![Just(0.0_f32), Just(0.01)],
         prop::array::uniform3(prop::bool::weighted(0.7)),
-        prop::collection::vec((offset.clone(), offset), 0..100),
+        prop::collection::vec((offset.clone(), offset), 0..200),
     )
         .prop_map(|(from, to, fan, area, axes, offsets)| {
             let axes = Vec3::from_array(axes.map(|kept| f32::from(u8::from(kept))));
@@ -109,29 +109,61 @@ proptest! {
     }
 }
 
+/// Lattices over a sphere, whose rays meet many of its vertices and edges exactly: from a point, and
+/// all in the same direction; in rows and in squares.
 #[test]
 fn bundles_through_a_mesh_find_what_single_rays_find() {
     let (positions, triangles) = common::icosphere(4, Vec3::ZERO);
-    let tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).unwrap();
-    let rays: Vec<Ray> = (0..10_000_u32)
-        .map(|i| {
-            let (x, y) = ((i % 100) as f32 / 80.0 - 0.7, (i / 100) as f32 / 80.0 - 0.6);
-            Ray::new(
-                Vec3::new(0.1, 0.2, 4.0),
-                Vec3::new(x, y, 0.3) - Vec3::new(0.1, 0.2, 4.0),
-            )
-        })
+    let rows = (0..10_000_u32).map(|i| (i % 100, i / 100)).collect();
+    let squares: Vec<(u32, u32)> = common::morton_cells(7).collect();
+    let light = Vec3::new(0.1, 0.2, 4.0);
+    for instructions in [Instructions::Detect, Instructions::Portable] {
+        let options = BvhOptions {
+            instructions,
+            ..Default::default()
+        };
+        let tree = TriangleBvh::new(&positions, &triangles, &options).unwrap();
+        for (cells, is_point) in [(&rows, true), (&squares, true), (&squares, false)] {
+            let rays: Vec<Ray> = cells
+                .iter()
+                .map(|&(x, y): &(u32, u32)| {
+                    let target = Vec3::new(x as f32 / 64.0 - 0.75, y as f32 / 64.0 - 0.75, 0.0);
+                    if is_point {
+                        Ray::new(light, target - light)
+                    } else {
+                        Ray::new(target + 4.0 * Vec3::Z, Vec3::NEG_Z)
+                    }
+                })
+                .collect();
+            let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
+            assert!(single.iter().flatten().count() > 5000);
+            let mut streamed = vec![None; rays.len()];
+            tree.closest_hits(&rays, &mut streamed);
+            assert_eq!(single, streamed);
+            // The shorter slice counts.
+            let mut few = vec![None; 85];
+            tree.closest_hits(&rays, &mut few);
+            assert_eq!(few, single[..85]);
+            tree.closest_hits(&rays[..3], &mut streamed);
+        }
+    }
+}
+
+/// Each of two triangles in one place is hit as often as it comes first.
+#[test]
+fn of_triangles_in_one_place_streams_find_the_first() {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let triangles = [[0, 1, 2]; 20];
+    let tree = TriangleBvh::new(&corners, &triangles, &BvhOptions::default()).unwrap();
+    let rays: Vec<Ray> = common::morton_cells(3)
+        .map(|(x, y)| Ray::new([x as f32 / 8.0, y as f32 / 8.0, 1.0], Vec3::NEG_Z))
         .collect();
+    let mut hits = vec![None; rays.len()];
+    tree.closest_hits(&rays, &mut hits);
     let single: Vec<Option<Hit>> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
-    assert!(single.iter().flatten().count() > 5000);
-    let mut streamed = vec![None; rays.len()];
-    tree.closest_hits(&rays, &mut streamed);
-    assert_eq!(single, streamed);
-    // The shorter slice counts.
-    let mut few = vec![None; 21];
-    tree.closest_hits(&rays, &mut few);
-    assert_eq!(few, single[..21]);
-    tree.closest_hits(&rays[..3], &mut streamed);
+    assert_eq!(hits, single);
+    assert!(hits.iter().flatten().count() > 30);
+    assert!(hits.iter().flatten().all(|hit| hit.primitive == 0));
 }
 
 #[test]

@@ -52,20 +52,24 @@ fn portable_instructions_leak_no_more() {
     );
 }
 
-/// As the photons of a lattice go: eight or sixteen of them through the same few triangles.
+/// As the photons of a lattice go: sixteen or 64 of them through the same few triangles.
 #[test]
 fn bundles_aimed_at_one_vertex_stay_inside() {
     let (positions, triangles) = icosphere(5, Vec3::ZERO);
     let tree = TriangleBvh::new(&positions, &triangles, &BvhOptions::default()).expect("a mesh");
-    let mut hits = [None; 16];
     for (i, &vertex) in positions.iter().enumerate() {
-        let rays: [Ray; 16] = std::array::from_fn(|ray| {
-            let turn = (ray + i) as f32;
-            let offset = Vec3::new(turn.sin(), turn.cos(), (2.0 * turn).sin()) * 0.01;
-            Ray::new(offset, vertex - offset)
-        });
-        tree.closest_hits(&rays, &mut hits);
-        assert!(hits.iter().all(Option::is_some), "vertex {i}");
+        let rays: Vec<Ray> = (0..64)
+            .map(|ray| {
+                let turn = (ray + i) as f32;
+                let offset = Vec3::new(turn.sin(), turn.cos(), (2.0 * turn).sin()) * 0.01;
+                Ray::new(offset, vertex - offset)
+            })
+            .collect();
+        for bundle in [16, 64] {
+            let mut hits = vec![None; bundle];
+            tree.closest_hits(&rays[..bundle], &mut hits);
+            assert!(hits.iter().all(Option::is_some), "vertex {i}");
+        }
     }
 }
 

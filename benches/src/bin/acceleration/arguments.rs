@@ -6,7 +6,7 @@ use caustics_benches::stage::Failure;
 pub(crate) const USAGE: &str = "\
 Times rays, builds and photon searches against the named peers, and writes the tables of it.
 
-    cargo run --release -p caustics-benches --features embree --bin acceleration -- [options]
+    cargo run --release -p caustics-benches --features embree,nanoflann-cpp --bin acceleration -- [options]
 
   --quick              small meshes, few photons, few runs: half a minute, for a look
   --only A,B           parts: traces, instances, builds, searches (default: all)
@@ -14,7 +14,8 @@ Times rays, builds and photon searches against the named peers, and writes the t
   --document FILE      Markdown whose marked tables are rewritten (default: docs/acceleration.md;
                        none with --quick, or for `none`)
 
-Without the feature `embree` (Debian's libembree-dev) obvhs is what ratios are relative to.
+Without the feature `embree` (Debian's libembree-dev) obvhs is what ratios are relative to; without
+the feature `nanoflann-cpp` (Debian's libnanoflann-dev) only nanoflann's port to Rust is compared.
 ";
 
 /// The parts of the program.

@@ -44,6 +44,7 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String
             "instances",
             "coherent",
             "incoherent",
+            "coherent streams",
             "a new upper level, ms",
             "a new flattened tree, ms",
             "bytes a triangle",
@@ -110,6 +111,27 @@ pub(crate) fn measure(arguments: &Arguments) -> Result<Vec<(&'static str, String
             );
             cells.push(figures(times[0].1 / times[1].1));
         }
+        let mut hits = vec![None; coherent.len()];
+        ours.closest_hits(&coherent, &mut hits);
+        let single = coherent.iter().map(|ray| ours.closest_hit(ray));
+        if !single.eq(hits.iter().copied()) {
+            return Err("streams through instances differ from single rays".into());
+        }
+        let mut of_whole = hits.clone();
+        let times = medians(
+            vec![
+                Contestant::new("flattened", || {
+                    whole.closest_hits(&coherent, &mut of_whole);
+                    of_whole.iter().flatten().count() as u64
+                }),
+                Contestant::new("instances", || {
+                    ours.closest_hits(&coherent, &mut hits);
+                    hits.iter().flatten().count() as u64
+                }),
+            ],
+            arguments.patience(),
+        );
+        cells.push(figures(times[0].1 / times[1].1));
         let triangles = flat.triangles.len() as f64;
         cells.push(figures(level_ms));
         cells.push(figures(flat_ms));

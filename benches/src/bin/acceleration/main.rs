@@ -1,7 +1,7 @@
 //! Times rays, builds and photon searches against the named peers, and writes the tables of it.
 //!
-//! `cargo run --release -p caustics-benches --features embree --bin acceleration -- --help` lists
-//! the options.
+//! `cargo run --release -p caustics-benches --features embree,nanoflann-cpp --bin acceleration -- --help`
+//! lists the options.
 
 mod arguments;
 mod builds;

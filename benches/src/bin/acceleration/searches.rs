@@ -3,6 +3,8 @@
 use std::num::NonZeroUsize;
 
 use caustics_accel::{HashGrid, LeftBalancedTree, NearestScratch, PhotonTree};
+#[cfg(feature = "nanoflann-cpp")]
+use caustics_benches::nanoflann_cpp::{FoundList, Nanoflann};
 use caustics_benches::photons::{pixel_queries, surface_photons};
 use caustics_benches::stage::Failure;
 use glam::Vec3;
@@ -32,6 +34,8 @@ struct Field<'a> {
     grids: [(HashGrid, Payload); 2],
     kiddo: ImmutableKdTree<f32, 3>,
     nanoflann: KdTree<'a, f32, MatrixDataset<f32>, L2Simple>,
+    #[cfg(feature = "nanoflann-cpp")]
+    original: Nanoflann<'a>,
     payload: Payload,
 }
 
@@ -83,8 +87,23 @@ impl Field<'_> {
                 }),
             ));
             if radius.is_infinite() {
+                #[cfg(feature = "nanoflann-cpp")]
                 searchers.push((
                     "nanoflann",
+                    Box::new(move |queries| {
+                        let (mut indices, mut distances) = (Vec::new(), Vec::new());
+                        let total = queries.iter().map(|q| {
+                            let point = q.to_array();
+                            self.original
+                                .nearest(point, count, &mut indices, &mut distances);
+                            let found = indices.iter();
+                            found.map(|&index| sum(&self.payload, index)).sum::<f64>()
+                        });
+                        total.sum()
+                    }),
+                ));
+                searchers.push((
+                    "nanoflann crate",
                     Box::new(move |queries| {
                         let total = queries.iter().map(|q| {
                             let found = self.nanoflann.knn_search(&q.to_array(), count);
@@ -163,8 +182,21 @@ impl Field<'_> {
             sorted: false,
             ..SearchParameters::default()
         };
+        #[cfg(feature = "nanoflann-cpp")]
         searchers.push((
             "nanoflann",
+            Box::new(move |queries| {
+                let mut list = FoundList::new();
+                let total = queries.iter().map(|q| {
+                    let found = self.original.within(q.to_array(), radius, &mut list);
+                    let found = found.iter().map(|found| found.index);
+                    found.map(|index| sum(&self.payload, index)).sum::<f64>()
+                });
+                total.sum()
+            }),
+        ));
+        searchers.push((
+            "nanoflann crate",
             Box::new(move |queries| {
                 let total = queries.iter().map(|q| {
                     let found = self.nanoflann.radius_search_with_params(
@@ -238,7 +270,12 @@ fn build_times(photons: &[Vec3], cell: f32, arguments: &Arguments) -> Result<Col
                         let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&rows);
                         u64::from(tree.is_ok())
                     }),
+                    #[cfg(feature = "nanoflann-cpp")]
                     Contestant::new("nanoflann", || {
+                        let _tree = Nanoflann::new(&rows);
+                        1
+                    }),
+                    Contestant::new("nanoflann crate", || {
                         let tree = KdTree::new(3, &dataset, L2Simple, KdTreeParams::default());
                         u64::from(tree.is_ok())
                     }),
@@ -322,6 +359,8 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
         grids: [grid_of(radii[0])?, grid_of(radii[1])?],
         kiddo: ImmutableKdTree::new_from_slice(&rows).map_err(|error| format!("{error:?}"))?,
         nanoflann: KdTree::new(3, &dataset, L2Simple, KdTreeParams::default())?,
+        #[cfg(feature = "nanoflann-cpp")]
+        original: Nanoflann::new(&rows),
         payload,
     };
     let ask = |title, count, radius, grid| Question {

@@ -1,4 +1,5 @@
 mod placement;
+mod stream;
 mod traverse;
 
 use std::sync::Arc;
@@ -7,6 +8,7 @@ use caustics_geometry::glam::Affine3A;
 use caustics_geometry::{Aabb, Hit, Ray};
 
 use self::placement::Placement;
+use self::stream::ClosestHits;
 use self::traverse::{ClosestHit, Occlusion};
 use crate::box_tree::{BoxTree, Member};
 use crate::simd::Dispatch;
@@ -169,6 +171,18 @@ impl InstanceBvh {
         }
         former.mesh = mesh;
         self.build()
+    }
+
+    /// The closest hits of many rays, the same as those of one after the other.
+    ///
+    /// As [`TriangleBvh::closest_hits`]: worth it where rays that follow each other lie close
+    /// together. What they share is also the transforming of the triangles.
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.dispatch.run(ClosestHits {
+            tree: self,
+            rays,
+            hits,
+        });
     }
 
     /// The instances, in the order in which they were given.

@@ -19,9 +19,9 @@ pub(super) struct Placement {
     /// The transform mirrors, so that triangles turn round.
     pub(super) mirrors: bool,
     /// What a box in the object's frame must grow by to each side, in its units: this ...
-    pad: f32,
+    pub(super) pad: f32,
     /// ... and this times the largest coordinate of a ray's origin.
-    pad_by_origin: f32,
+    pub(super) pad_by_origin: f32,
 }
 
 impl Placement {

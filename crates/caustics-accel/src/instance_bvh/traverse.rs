@@ -20,15 +20,19 @@ impl Kernel for ClosestHit<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        let Self { tree, ray } = self;
-        if !is_usable(ray) {
-            return None;
-        }
-        let mut closest = Closest::new(ray);
-        let among = Among::new(lanes, tree, ray);
-        search(lanes, &tree.nodes, tree.root, &among, &mut closest);
-        closest.hit
+        closest_hit(lanes, self.tree, self.ray)
     }
+}
+
+#[inline(always)]
+pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: &InstanceBvh, ray: &Ray) -> Option<Hit> {
+    if !is_usable(ray) {
+        return None;
+    }
+    let mut closest = Closest::new(ray);
+    let among = Among::new(lanes, tree, ray);
+    search(lanes, &tree.nodes, tree.root, &among, &mut closest);
+    closest.hit
 }
 
 /// Whether a ray hits anything.
@@ -53,7 +57,7 @@ impl Kernel for Occlusion<'_> {
 }
 
 /// A ray in the world, among the boxes of instances.
-struct Among<'a, F> {
+pub(super) struct Among<'a, F> {
     slabs: Slabs<F>,
     sheared: ShearedRay,
     tree: &'a InstanceBvh,
@@ -62,7 +66,7 @@ struct Among<'a, F> {
 
 impl<'a, F: Copy> Among<'a, F> {
     #[inline(always)]
-    fn new<L: Lanes<Floats = F>>(lanes: L, tree: &'a InstanceBvh, ray: &'a Ray) -> Self {
+    pub(super) fn new<L: Lanes<Floats = F>>(lanes: L, tree: &'a InstanceBvh, ray: &'a Ray) -> Self {
         Self {
             slabs: Slabs::new(lanes, ray),
             sheared: ShearedRay::new(ray),
@@ -116,7 +120,7 @@ impl<L: Lanes> Meet<L> for Among<'_, L::Floats> {
 /// A ray inside a placed mesh: its boxes are met in the object's frame, by a ray that rounding has
 /// moved and boxes grown by more than that; its triangles in the world, where their vertices are
 /// to the bit those of the flattened mesh.
-struct Inside<'a, F> {
+pub(super) struct Inside<'a, F> {
     /// By axis: the origin moved back, for the side where boxes are entered ...
     origin_near: [F; 3],
     /// ... and forth, for the side where they are left.
@@ -133,7 +137,7 @@ struct Inside<'a, F> {
 
 impl<'a, F: Copy> Inside<'a, F> {
     #[inline(always)]
-    fn new<L: Lanes<Floats = F>>(
+    pub(super) fn new<L: Lanes<Floats = F>>(
         lanes: L,
         placement: &'a Placement,
         sheared: &'a ShearedRay,
@@ -212,7 +216,7 @@ impl<L: Lanes> Meet<L> for Inside<'_, L::Floats> {
 
 /// Eight triangles in the world, rounded as `Affine3A::transform_point3` rounds them.
 #[inline(always)]
-fn place<L: Lanes>(lanes: L, placement: &Placement, block: &Block) -> Block {
+pub(super) fn place<L: Lanes>(lanes: L, placement: &Placement, block: &Block) -> Block {
     let [a, b, c] = [0, 1, 2].map(|vertex| block.vertices[vertex]);
     let (b, c) = if placement.mirrors { (c, b) } else { (b, c) };
     Block {

@@ -104,6 +104,11 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn select(self, mask: __m256, yes: __m256, no: __m256) -> __m256 {
+        unsafe { _mm256_blendv_ps(no, yes, mask) }
+    }
+
+    #[inline(always)]
     fn bits(self, mask: __m256) -> u32 {
         unsafe { _mm256_movemask_ps(mask) as u32 }
     }

@@ -33,6 +33,8 @@ pub(crate) trait Lanes: Copy {
     fn at_most(self, a: Self::Floats, b: Self::Floats) -> Self::Mask;
     fn and(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
     fn or(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// `yes` where the mask is set, else `no`.
+    fn select(self, mask: Self::Mask, yes: Self::Floats, no: Self::Floats) -> Self::Floats;
     /// Lane 0 in the lowest bit.
     fn bits(self, mask: Self::Mask) -> u32;
     /// For each lane whose bit is set, in order and without gaps: the bits of its float in the high
@@ -144,6 +146,17 @@ impl Lanes for Portable {
             *a |= b;
         }
         a
+    }
+
+    #[inline(always)]
+    fn select(self, mask: [u32; WIDTH], yes: Row, no: Row) -> Row {
+        let mut out = no;
+        for lane in 0..WIDTH {
+            if mask[lane] != 0 {
+                out[lane] = yes[lane];
+            }
+        }
+        out
     }
 
     #[inline(always)]

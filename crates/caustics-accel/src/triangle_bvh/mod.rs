@@ -1,8 +1,10 @@
 mod binary_tree;
+pub(crate) mod bundle;
 mod collapse;
+pub(crate) mod gather;
 pub(crate) mod layout;
 mod refit;
-mod stream;
+pub(crate) mod stream;
 pub(crate) mod traverse;
 
 use caustics_geometry::glam::{Vec3, Vec3A};
@@ -178,8 +180,8 @@ impl TriangleBvh {
     /// The closest hits of many rays, the same as those of one after the other.
     ///
     /// Worth it where rays that follow each other lie close together, as those from a lattice over
-    /// a light do, in rows or better in Morton order: sixteen at a time share their way through
-    /// the tree. Rays that do not keep together are traced one by one. The shorter of the two
+    /// a light do: in Morton order 64 at a time share their way through the tree, in rows sixteen.
+    /// Rays that do not keep together are traced one by one. The shorter of the two
     /// slices says how many there are.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.dispatch.run(ClosestHits {

@@ -13,12 +13,12 @@ use crate::simd::{Lanes, Row, next_lane};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRay {
     /// The axis along which the direction is longest comes last.
-    axes: [usize; 3],
+    pub(super) axes: [usize; 3],
     /// In the order of `axes`.
-    origin: [f32; 3],
+    pub(super) origin: [f32; 3],
     /// The direction's other two components over its longest, and the reciprocal of that.
-    shear: [f32; 3],
-    t_min: f32,
+    pub(super) shear: [f32; 3],
+    pub(super) t_min: f32,
 }
 
 /// The closest hit so far.
@@ -44,7 +44,7 @@ impl Closest {
     }
 
     #[inline(always)]
-    fn offer(&mut self, hit: Hit) {
+    pub(super) fn offer(&mut self, hit: Hit) {
         let hit = Hit {
             primitive: hit.primitive + self.first,
             ..hit
@@ -59,14 +59,20 @@ impl Closest {
     }
 }
 
+/// The three axes, the one along which a direction is longest last.
+#[inline(always)]
+pub(crate) fn axes_of(direction: Vec3) -> [usize; 3] {
+    let longest = direction.abs().max_position();
+    [(longest + 1) % 3, (longest + 2) % 3, longest]
+}
+
 impl ShearedRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
-        let longest = ray.direction.abs().max_position();
-        let axes = [(longest + 1) % 3, (longest + 2) % 3, longest];
-        let along = direction[longest];
+        let axes = axes_of(ray.direction);
+        let along = direction[axes[2]];
         Self {
             axes,
             origin: axes.map(|axis| origin[axis]),
@@ -143,23 +149,59 @@ impl ShearedRay {
         false
     }
 
-    /// Moves and shears eight vertices so that the ray becomes the z axis.
+    #[inline(always)]
+    fn hit<L: Lanes>(&self, lanes: L, block: &Block, limit: f32) -> Hits<L> {
+        let [x, y, z] = self.axes;
+        let [a, b, c] = &block.vertices;
+        let vertices = [
+            load(lanes, [&a[x], &a[y], &a[z]]),
+            load(lanes, [&b[x], &b[y], &b[z]]),
+            load(lanes, [&c[x], &c[y], &c[z]]),
+        ];
+        let ray = Sheared {
+            origin: splat(lanes, self.origin),
+            shear: splat(lanes, self.shear),
+            t_min: lanes.splat(self.t_min),
+        };
+        ray.hit(lanes, &vertices, lanes.splat(limit))
+    }
+}
+
+#[inline(always)]
+pub(super) fn load<L: Lanes>(lanes: L, [x, y, z]: [&Row; 3]) -> [L::Floats; 3] {
+    [lanes.load(x), lanes.load(y), lanes.load(z)]
+}
+
+#[inline(always)]
+pub(super) fn splat<L: Lanes>(lanes: L, [x, y, z]: [f32; 3]) -> [L::Floats; 3] {
+    [lanes.splat(x), lanes.splat(y), lanes.splat(z)]
+}
+
+/// A ray in each lane, or one in all of them: see [`ShearedRay`].
+pub(super) struct Sheared<F> {
+    pub(super) origin: [F; 3],
+    pub(super) shear: [F; 3],
+    pub(super) t_min: F,
+}
+
+impl<F: Copy> Sheared<F> {
+    /// Moves and shears vertices so that the ray becomes the z axis.
     // Not a closure: those are compiled for the base instructions before they are inlined.
     #[inline(always)]
-    fn project<L: Lanes>(&self, lanes: L, rows: &[Row; 3]) -> (L::Floats, L::Floats, L::Floats) {
-        let [x, y, z] = self.axes;
-        let to_x = lanes.sub(lanes.load(&rows[x]), lanes.splat(self.origin[0]));
-        let to_y = lanes.sub(lanes.load(&rows[y]), lanes.splat(self.origin[1]));
-        let to_z = lanes.sub(lanes.load(&rows[z]), lanes.splat(self.origin[2]));
+    fn project<L: Lanes<Floats = F>>(&self, lanes: L, [x, y, z]: &[F; 3]) -> (F, F, F) {
+        let to_x = lanes.sub(*x, self.origin[0]);
+        let to_y = lanes.sub(*y, self.origin[1]);
+        let to_z = lanes.sub(*z, self.origin[2]);
         (
-            lanes.sub(to_x, lanes.mul(lanes.splat(self.shear[0]), to_z)),
-            lanes.sub(to_y, lanes.mul(lanes.splat(self.shear[1]), to_z)),
+            lanes.sub(to_x, lanes.mul(self.shear[0], to_z)),
+            lanes.sub(to_y, lanes.mul(self.shear[1], to_z)),
             to_z,
         )
     }
 
-    /// Tests eight triangles: edge functions for the weights of the three vertices and their sum,
-    /// the ray parameters, and the lanes that are hit between the ray's `t_min` and `limit`.
+    /// Tests a triangle in each lane, or one in all of them: edge functions for the weights of the
+    /// three vertices and their sum, the ray parameters, and the lanes that are hit between the
+    /// ray's `t_min` and `limit`.
     ///
     /// Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, JCGT 2013: the ray becomes the
     /// z axis, and every vertex is projected in the same way whatever triangle it belongs to. The
@@ -167,10 +209,15 @@ impl ShearedRay {
     /// long as nothing contracts the products and the difference. One that rounds to zero counts
     /// as inside for both, so that an edge or vertex is never missed.
     #[inline(always)]
-    fn hit<L: Lanes>(&self, lanes: L, block: &Block, limit: f32) -> BlockHits<L::Floats> {
-        let (a_x, a_y, a_z) = self.project(lanes, &block.vertices[0]);
-        let (b_x, b_y, b_z) = self.project(lanes, &block.vertices[1]);
-        let (c_x, c_y, c_z) = self.project(lanes, &block.vertices[2]);
+    pub(super) fn hit<L: Lanes<Floats = F>>(
+        &self,
+        lanes: L,
+        [a, b, c]: &[[F; 3]; 3],
+        limit: F,
+    ) -> Hits<L> {
+        let (a_x, a_y, a_z) = self.project(lanes, a);
+        let (b_x, b_y, b_z) = self.project(lanes, b);
+        let (c_x, c_y, c_z) = self.project(lanes, c);
         let a = lanes.sub(lanes.mul(c_x, b_y), lanes.mul(c_y, b_x));
         let b = lanes.sub(lanes.mul(a_x, c_y), lanes.mul(a_y, c_x));
         let c = lanes.sub(lanes.mul(b_x, a_y), lanes.mul(b_y, a_x));
@@ -179,11 +226,12 @@ impl ShearedRay {
         let all_negative = lanes.at_most(lanes.max(lanes.max(a, b), c), zero);
         let inside = lanes.or(all_positive, all_negative);
         if lanes.bits(inside) == 0 {
-            return BlockHits {
+            return Hits {
                 b,
                 c,
                 sum: a,
                 t: a,
+                met: inside,
                 lanes: 0,
                 vanishing: 0,
             };
@@ -196,38 +244,38 @@ impl ShearedRay {
             lanes.add(lanes.mul(a, a_z), lanes.mul(b, b_z)),
             lanes.mul(c, c_z),
         );
-        let t = lanes.div(lanes.mul(depth, lanes.splat(self.shear[2])), sum);
-        let in_range = lanes.and(
-            lanes.less(lanes.splat(self.t_min), t),
-            lanes.at_most(t, lanes.splat(limit)),
-        );
-        let hit = lanes.bits(lanes.and(inside, in_range)) & !vanishing;
-        BlockHits {
+        let t = lanes.div(lanes.mul(depth, self.shear[2]), sum);
+        let in_range = lanes.and(lanes.less(self.t_min, t), lanes.at_most(t, limit));
+        let met = lanes.and(inside, in_range);
+        Hits {
             b,
             c,
             sum,
             t,
-            lanes: hit,
+            met,
+            lanes: lanes.bits(met) & !vanishing,
             vanishing,
         }
     }
 }
 
-struct BlockHits<F> {
-    b: F,
-    c: F,
-    sum: F,
-    t: F,
+pub(super) struct Hits<L: Lanes> {
+    pub(super) b: L::Floats,
+    pub(super) c: L::Floats,
+    pub(super) sum: L::Floats,
+    pub(super) t: L::Floats,
+    /// Lanes that are hit, and perhaps some of those that vanish.
+    pub(super) met: L::Mask,
     /// Lanes that are hit.
-    lanes: u32,
+    pub(super) lanes: u32,
     /// Lanes whose edge functions are too small for normal floats and say nothing.
-    vanishing: u32,
+    pub(super) vanishing: u32,
 }
 
 /// The test again for one triangle whose edge functions vanish, with products that do not.
 #[cold]
 #[inline(never)]
-fn hit_vanishing(block: &Block, lane: usize, ray: &Ray, limit: f32) -> Option<Hit> {
+pub(super) fn hit_vanishing(block: &Block, lane: usize, ray: &Ray, limit: f32) -> Option<Hit> {
     let [a, b, c] = block
         .vertices
         .map(|rows| Vec3::from_array(rows.map(|row| row[lane])));

@@ -82,6 +82,16 @@ pub(crate) fn icosphere(subdivisions: u32, centre: Vec3) -> (Vec<Vec3>, Vec<[u32
     (positions, triangles)
 }
 
+/// A square lattice's cells in Morton order, by column and row: 4 to the power of `log2_side`.
+pub(crate) fn morton_cells(log2_side: u32) -> impl Iterator<Item = (u32, u32)> {
+    let every_other = move |code: u32| {
+        (0..log2_side)
+            .map(|bit| (code >> (2 * bit) & 1) << bit)
+            .sum()
+    };
+    (0..1_u32 << (2 * log2_side)).map(move |code| (every_other(code), every_other(code >> 1)))
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Aim {
     /// At a random point of a random edge.
