@@ -18,15 +18,15 @@ pub struct TraceCounters {
 
 impl TraceCounters {
     /// Words of the buffer of counters. Mirrors `COUNTERS` in `shaders/ledger.wgsl`.
-    pub const WORDS: usize = 98;
+    pub const WORDS: usize = 112;
 
     pub(crate) const STORED: usize = 0;
     pub(crate) const LINES: usize = 2;
-    pub(crate) const RAYS: usize = 15;
-    pub(crate) const FALLBACKS: usize = 16;
-    pub(crate) const BOUNDED: usize = 17;
-    pub(crate) const REPLACED: usize = 18;
-    pub(crate) const SUMS: usize = 20;
+    pub(crate) const RAYS: usize = 17;
+    pub(crate) const FALLBACKS: usize = 18;
+    pub(crate) const BOUNDED: usize = 19;
+    pub(crate) const REPLACED: usize = 20;
+    pub(crate) const SUMS: usize = 22;
 
     /// The fates in the order of the shader's lines, which further ones follow.
     pub(crate) const FATES: [Fate; 10] = [
@@ -44,6 +44,8 @@ impl TraceCounters {
     pub(crate) const CROWDED: usize = 10;
     pub(crate) const EMITTED: usize = 11;
     pub(crate) const ROULETTE_GAIN: usize = 12;
+    pub(crate) const SILHOUETTE_GAIN: usize = 13;
+    pub(crate) const SILHOUETTE_LOSS: usize = 14;
 
     /// Reads the words of [`PhotonBuffers::counters`](crate::PhotonBuffers::counters) after photons
     /// of `plan` were traced: all of them, or the light that its other photons carry counts as
@@ -79,6 +81,8 @@ impl TraceCounters {
         // Light of directions that two emitters cover is emitted once.
         let overlap = ledger.entry(Fate::Overlap).flux;
         ledger.emit_unaimed(plan.power() - (emitted.flux - overlap));
+        ledger.silhouette_gain =
+            entry(Self::SILHOUETTE_GAIN).flux - entry(Self::SILHOUETTE_LOSS).flux;
         ledger.rays = u64::from(words[Self::RAYS]);
         ledger.normal_fallbacks = u64::from(words[Self::FALLBACKS]);
         ledger.bounded_differentials = u64::from(words[Self::BOUNDED]);

@@ -19,19 +19,22 @@ const FATE_CROWDED: u32 = 10u;
 // Not ends, but lines of the same form.
 const LINE_EMITTED: u32 = 11u;
 const LINE_ROULETTE_GAIN: u32 = 12u;
-const LINES: u32 = 13u;
+// What photons at silhouettes got, and what was taken from them.
+const LINE_SILHOUETTE_GAIN: u32 = 13u;
+const LINE_SILHOUETTE_LOSS: u32 = 14u;
+const LINES: u32 = 15u;
 
 // The words of the buffer: records stored, and parts lost because there was no room; then a count
 // for each line, then other counts, then sums by line, channel and word, the lower first.
 const COUNTER_STORED: u32 = 0u;
 const COUNTER_LOST: u32 = 1u;
 const COUNTER_LINES: u32 = 2u;
-const COUNTER_RAYS: u32 = 15u;
-const COUNTER_FALLBACKS: u32 = 16u;
-const COUNTER_BOUNDED: u32 = 17u;
-const COUNTER_REPLACED: u32 = 18u;
-const COUNTER_SUMS: u32 = 20u;
-const COUNTERS: u32 = 98u;
+const COUNTER_RAYS: u32 = 17u;
+const COUNTER_FALLBACKS: u32 = 18u;
+const COUNTER_BOUNDED: u32 = 19u;
+const COUNTER_REPLACED: u32 = 20u;
+const COUNTER_SUMS: u32 = 22u;
+const COUNTERS: u32 = 112u;
 
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 

@@ -32,6 +32,18 @@ fn landed(photon: u32, path: u32) -> Landed {
     return result;
 }
 
+fn flux_of(record: FootprintRecord) -> vec3<f32> {
+    return vec3(record.flux_r, record.flux_g, record.flux_b);
+}
+
+fn book_silhouette(before: vec3<f32>, after: vec3<f32>) {
+    if any(after > before) {
+        book(LINE_SILHOUETTE_GAIN, after - before);
+    } else if any(after < before) {
+        book(LINE_SILHOUETTE_LOSS, before - after);
+    }
+}
+
 fn order_photon(photon: u32) {
     let slot = slot_of(photon);
     var place = links[slot];
@@ -51,15 +63,14 @@ fn order_photon(photon: u32) {
         let before = links[link];
         let path = links[link + 1u];
         if checks && (before & LINK_THINNED) == 0u {
-            let along = checked_axis(
-                record, record.axis_u, landed(beside[0].x, path), landed(beside[0].y, path));
-            let across = checked_axis(
-                record, record.axis_v, landed(beside[1].x, path), landed(beside[1].y, path));
-            record.position = record.position + along.shift;
-            record.position = record.position + across.shift;
-            record.axis_u = along.axis;
-            record.axis_v = across.axis;
-            count_up(COUNTER_REPLACED, select(0u, 1u, along.is_replaced || across.is_replaced));
+            let after = checked(
+                record,
+                array(landed(beside[0].x, path), landed(beside[0].y, path)),
+                array(landed(beside[1].x, path), landed(beside[1].y, path)),
+            );
+            count_up(COUNTER_REPLACED, select(0u, 1u, after.is_replaced));
+            book_silhouette(flux_of(record), flux_of(after.record));
+            record = after.record;
         }
         records[ordered] = record;
         paths[ordered] = path;

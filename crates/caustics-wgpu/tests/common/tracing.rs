@@ -70,6 +70,7 @@ pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<Photon
         for photon in &mut trail.photons {
             let checked = checked.next().unwrap();
             assert_eq!(photon.incoming, checked.incoming);
+            trail.ledger.silhouette_gain += checked.flux.as_dvec3() - photon.flux.as_dvec3();
             *photon = checked;
             let is_replaced = photon.source == FootprintSource::Neighbour;
             trail.ledger.replaced_differentials += u64::from(is_replaced);
@@ -301,6 +302,9 @@ pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -
     let lines = Fate::ALL.into_iter().filter(unlike);
     let lines =
         lines.map(|fate| format!("{}: {:?}, {:?}", fate.name(), a.entry(fate), b.entry(fate)));
+    let gains = [a, b].map(|it| it.silhouette_gain);
+    let gained = (gains[0] - gains[1]).abs().max_element() > 1e-4 * emitted;
+    let gained = gained.then(|| format!("silhouettes: {gains:?}"));
     let counts = [
         (
             "replaced",
@@ -313,5 +317,5 @@ pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -
     let unlike = |(_, one, other): &(_, u64, u64)| 1000 * one.abs_diff(*other) > photons as u64;
     let counts = counts.into_iter().filter(unlike);
     let counts = counts.map(|(name, one, other)| format!("{name}: {one}, {other}"));
-    lines.chain(counts).collect()
+    lines.chain(gained).chain(counts).collect()
 }
