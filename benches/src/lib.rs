@@ -1,5 +1,6 @@
 //! What the benchmarks of this workspace have in common: meshes, rays, photons and peers.
 
+pub mod chart;
 pub mod conditions;
 pub mod document;
 #[cfg(feature = "embree")]

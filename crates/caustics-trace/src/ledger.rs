@@ -124,8 +124,7 @@ pub struct EnergyLedger {
     pub replaced_differentials: u64,
     /// What the photons at silhouettes carry more than their paths brought them, or less where it is
     /// negative, in watts: each stands for the light from the silhouette on, of which its row of the
-    /// lattice may have more or less than a cell. [`Fate::Stored`] is without it, and on the mean it
-    /// is little.
+    /// lattice may have more or less than a cell. It is part of what is [`Fate::Stored`].
     pub silhouette_gain: DVec3,
     /// Rays traced, shadow rays not among them.
     pub rays: u64,
@@ -160,7 +159,7 @@ impl EnergyLedger {
     /// relative to the brightest channel of what came in; 0 when nothing was emitted.
     #[must_use]
     pub fn imbalance(&self) -> f64 {
-        let incoming = self.emitted.flux + self.roulette_gain;
+        let incoming = self.emitted.flux + self.roulette_gain + self.silhouette_gain;
         let scale = incoming.max_element();
         if scale <= 0.0 {
             return 0.0;
@@ -187,6 +186,11 @@ impl EnergyLedger {
     /// Books flux that a surviving path was given.
     pub fn gain(&mut self, flux: Vec3) {
         self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// Books what photons that are stored have more, in watts.
+    pub(crate) fn gain_stored(&mut self, flux: DVec3) {
+        self.fates[Fate::Stored as usize].flux += flux;
     }
 
     /// Books flux anew that was booked as stored.

@@ -92,17 +92,18 @@ enum Edge {
 impl Landed {
     /// Of the neighbours before and after a photon along one axis; `None` without one on the same
     /// object: past a corner light goes on, on a receiver whose plane says nothing about this one.
-    fn of(photon: &Photon, axis: Vec3, pair: &[Option<&Photon>; 2]) -> Option<Self> {
+    fn of(photon: &Photon, number: usize, pair: &[Option<&Photon>; 2]) -> Option<Self> {
+        let axis = photon.axes[number];
         let in_plane = |neighbour: &Photon| {
             let displacement = neighbour.position - photon.position;
             displacement - photon.normal * displacement.dot(photon.normal)
         };
-        let farthest = pair
+        let (farthest, beside) = pair
             .iter()
             .flatten()
             .filter(|it| it.object == photon.object)
-            .map(|it| in_plane(it))
-            .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+            .map(|it| (in_plane(it), it.axes[number]))
+            .max_by(|(a, _), (b, _)| a.length_squared().total_cmp(&b.length_squared()))?;
         let distance = farthest.length();
         // By its largest coordinate where the square of a long axis overflows.
         let largest = axis.abs().max_element();
@@ -113,7 +114,9 @@ impl Landed {
         };
         let ratio = (length / distance).min(MAX_RATIO);
         let is_edge = pair.iter().flatten().count() == 1;
-        let edge = is_edge.then(|| Silhouette::of(ratio).map_or(Edge::Even, Edge::Silhouette));
+        let slope = length / beside.length();
+        let edge =
+            is_edge.then(|| Silhouette::of(ratio, slope).map_or(Edge::Even, Edge::Silhouette));
         Some(Self {
             farthest,
             ratio,
@@ -121,10 +124,10 @@ impl Landed {
         })
     }
 
-    /// How far from the photon a silhouette is, in cells.
+    /// How far from the photon a silhouette is, in cells, if that is sure.
     fn inside(&self) -> f32 {
         match &self.edge {
-            Some(Edge::Silhouette(silhouette)) => silhouette.inside,
+            Some(Edge::Silhouette(silhouette)) if silhouette.is_sure => silhouette.inside,
             _ => f32::INFINITY,
         }
     }
@@ -136,7 +139,7 @@ impl Landed {
 ///
 /// A silhouette ends the rows of the lattice that it crosses more steeply than the columns: the last
 /// photon of each has all of its row's light from the silhouette on. So a silhouette is told by the
-/// axis on which it is nearer, and within a cell.
+/// axis on which it is nearer, within a cell, and as its neighbour says, too.
 pub(crate) fn checked(photon: &Photon, neighbours: &[[Option<&Photon>; 2]; 2]) -> CheckedFootprint {
     let mut footprint = CheckedFootprint {
         position: photon.position,
@@ -144,7 +147,7 @@ pub(crate) fn checked(photon: &Photon, neighbours: &[[Option<&Photon>; 2]; 2]) -
         cells: 1.0,
         source: photon.source,
     };
-    let landed = [0, 1].map(|i| Landed::of(photon, photon.axes[i], &neighbours[i]));
+    let landed = [0, 1].map(|i| Landed::of(photon, i, &neighbours[i]));
     let inside = landed
         .each_ref()
         .map(|it| it.as_ref().map_or(f32::INFINITY, Landed::inside));

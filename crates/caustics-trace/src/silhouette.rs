@@ -5,6 +5,9 @@ const EXTENT: f32 = 0.78;
 /// from an edge of even light.
 const LEAST_RATIO: f32 = 1.02;
 
+/// By how much of a cell the two ways to tell the distance of a silhouette may differ.
+const AGREEMENT: f32 = 0.1;
+
 /// A silhouette beside a photon of a lattice.
 ///
 /// A ray that meets a smooth surface a small distance x inside its silhouette turns, and lands away
@@ -16,6 +19,10 @@ pub(crate) struct Silhouette {
     ratio: f32,
     /// How far inside the silhouette the photon is, in cells of the lattice.
     pub(crate) inside: f32,
+    /// Whether the neighbour's differential says the same, with which this one's has the ratio
+    /// sqrt(1 + 1/x). Where cells are so wide that light turns otherwise than by the square root, they
+    /// differ.
+    pub(crate) is_sure: bool,
 }
 
 /// The part of the light at a silhouette that a photon stands for.
@@ -30,12 +37,17 @@ pub(crate) struct Share {
 }
 
 impl Silhouette {
-    /// Of a photon whose differential is `ratio` times as long as its one neighbour is far away;
-    /// `None` where that tells no silhouette.
-    pub(crate) fn of(ratio: f32) -> Option<Self> {
-        (ratio > LEAST_RATIO).then(|| Self {
-            ratio,
-            inside: 1.0 / (4.0 * ratio * (ratio - 1.0)),
+    /// Of a photon whose differential is `ratio` times as long as its one neighbour is far away, and
+    /// `slope` times as long as that neighbour's; `None` where that tells no silhouette.
+    pub(crate) fn of(ratio: f32, slope: f32) -> Option<Self> {
+        (ratio > LEAST_RATIO).then(|| {
+            let inside = 1.0 / (4.0 * ratio * (ratio - 1.0));
+            let by_slope = 1.0 / (slope * slope - 1.0);
+            Self {
+                ratio,
+                inside,
+                is_sure: slope > 1.0 && (inside - by_slope).abs() < AGREEMENT,
+            }
         })
     }
 

@@ -72,12 +72,15 @@ impl Traced {
     pub(crate) fn check_footprints(&mut self, options: &TraceOptions, planned: &EmissionBatch) {
         let count = planned.count();
         if Self::are_checked(options, planned) && self.starts.len() == count as usize {
+            let before = self.ledger.silhouette_gain;
             self.photons = self.checked(planned.lattice(), 0..count);
+            let gain = self.ledger.silhouette_gain - before;
+            self.ledger.gain_stored(gain);
         }
     }
 
     /// The photons of some points with checked footprints; `lattice` has all points that there are
-    /// photons of here.
+    /// photons of here. Those that are booked as stored are so with the flux that they had before.
     pub(crate) fn checked(
         &mut self,
         lattice: &Lattice,

@@ -3,8 +3,8 @@
 mod common;
 
 use caustics_scene::{Light, Material, Scene};
-use caustics_trace::glam::Vec3;
-use caustics_trace::{FootprintSource, PhotonMap, TraceOptions, trace_photons};
+use caustics_trace::glam::{DVec3, Vec3};
+use caustics_trace::{Fate, FootprintSource, PhotonMap, TraceOptions, trace_photons};
 
 use common::scenes::{add_floor, add_sphere, flattened};
 
@@ -30,13 +30,21 @@ fn trace(check_footprints: bool, photons: u32) -> PhotonMap {
 }
 
 #[test]
-fn the_check_shortens_and_moves_and_changes_no_flux() {
+fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
     let (plain, checked) = (trace(false, 20_000), trace(true, 20_000));
     assert_eq!(plain.photons.len(), checked.photons.len());
     assert_eq!(plain.ledger.replaced_differentials, 0);
-    let (mut replaced, mut verified, mut moved) = (0, 0, 0);
+    let (mut replaced, mut verified, mut moved, mut weighed) = (0, 0, 0, 0);
+    let mut gain = DVec3::ZERO;
     for (before, after) in plain.photons.iter().zip(&checked.photons) {
-        assert_eq!(before.flux, after.flux);
+        let weight = after.flux.x / before.flux.x;
+        if after.source == FootprintSource::Neighbour {
+            assert!((0.5..1.5001).contains(&weight), "{weight}");
+            weighed += u64::from(weight != 1.0);
+        } else {
+            assert_eq!(before.flux, after.flux);
+        }
+        gain += after.flux.as_dvec3() - before.flux.as_dvec3();
         assert_eq!(
             (before.incoming, before.object),
             (after.incoming, after.object)
@@ -70,6 +78,12 @@ fn the_check_shortens_and_moves_and_changes_no_flux() {
     // All around the silhouette, and hardly anywhere else.
     assert!(replaced > 100, "{replaced}");
     assert!(moved > 100, "{moved}");
+    assert!(weighed > 100, "{weighed}");
+    assert!((gain - checked.ledger.silhouette_gain).length() < 1e-12);
+    // Some get more and some get less; here, where all rows end alike, mostly less.
+    let stored = checked.ledger.entry(Fate::Stored).flux;
+    assert!(gain.length() < 3e-3 * stored.length(), "{gain} of {stored}");
+    assert!(checked.ledger.imbalance() < 1e-6);
     assert!(verified > 10 * replaced, "{verified} {replaced}");
 }
 

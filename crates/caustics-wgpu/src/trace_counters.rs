@@ -81,8 +81,15 @@ impl TraceCounters {
         // Light of directions that two emitters cover is emitted once.
         let overlap = ledger.entry(Fate::Overlap).flux;
         ledger.emit_unaimed(plan.power() - (emitted.flux - overlap));
-        ledger.silhouette_gain =
-            entry(Self::SILHOUETTE_GAIN).flux - entry(Self::SILHOUETTE_LOSS).flux;
+        let gain = entry(Self::SILHOUETTE_GAIN).flux - entry(Self::SILHOUETTE_LOSS).flux;
+        ledger.silhouette_gain = gain;
+        ledger.add(
+            Fate::Stored,
+            &LedgerEntry {
+                count: 0,
+                flux: gain,
+            },
+        );
         ledger.rays = u64::from(words[Self::RAYS]);
         ledger.normal_fallbacks = u64::from(words[Self::FALLBACKS]);
         ledger.bounded_differentials = u64::from(words[Self::BOUNDED]);

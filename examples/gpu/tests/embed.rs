@@ -19,12 +19,10 @@ struct Expected {
 impl Expected {
     fn new(scene: &Scene, trace: TraceOptions) -> Result<Self, Failure> {
         let [width, height] = SIZE;
-        let mut options = CausticsOptions {
+        let options = CausticsOptions {
             trace,
             ..CausticsOptions::default()
         };
-        // As on the GPU.
-        options.trace.check_footprints = false;
         let size = PictureOptions {
             width,
             height,
@@ -94,7 +92,7 @@ fn the_engine_shows_the_caustics_of_the_cpu() -> Result<(), Failure> {
     let expected = Expected::new(&scene, trace)?;
     let off = expected.difference(&snapshot.irradiance);
     println!("off by {off:.2e}");
-    assert!(off < 0.03, "{off}");
+    assert!(off < 0.01, "{off}");
     // The comparison can fail: neither a darker picture nor one that is moved by a pixel passes.
     let mut broken = snapshot.irradiance.clone();
     for pixel in &mut broken {

@@ -7,9 +7,8 @@ use caustics::filter::{Image, read_exr, relative_errors, trimmed_mean};
 use caustics::prelude::*;
 use caustics::scene::gltf;
 use caustics::{Progressive, Quantum};
+use caustics_benches::chart::{self, Line, Panel};
 use caustics_benches::stage::{Failure, scene_folder};
-
-use crate::chart::{self, Line, Panel};
 
 /// Photons that are kept at most.
 const KEPT: u32 = 1 << 18;

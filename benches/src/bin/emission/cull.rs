@@ -8,10 +8,9 @@ use caustics::prelude::*;
 use caustics::render::{FootprintOptions, GBuffer, splat};
 use caustics::scene::Projection;
 use caustics::trace::{Culling, Fate, PhotonMap, SolidAngleLimit, ViewVolume, trace_photons};
+use caustics_benches::chart::{self, Line, Panel};
 use caustics_benches::stage::{Failure, Stage};
 use glam::Vec3;
-
-use crate::chart::{self, Line, Panel};
 
 const PHOTONS: u32 = 1 << 16;
 

@@ -8,10 +8,10 @@ use caustics::prelude::*;
 use caustics::sampling::Sequence;
 use caustics::scene::gltf;
 use caustics::trace::{LivePhotons, trace_photons};
+use caustics_benches::chart::{self, Line, Panel};
 use caustics_benches::stage::{Failure, scene_folder};
 use glam::{Affine3A, Quat};
 
-use crate::chart::{self, Line, Panel};
 use crate::view::{View, difference, mean_absolute};
 
 /// Frames in which the glass turns, and as many in which it stands still again.

@@ -11,7 +11,6 @@
 
 mod aim;
 mod area;
-mod chart;
 mod compact;
 mod converge;
 mod cull;

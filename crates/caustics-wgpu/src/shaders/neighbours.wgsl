@@ -6,12 +6,15 @@ const EDGE_SHIFT: f32 = 0.13;
 const EDGE_EXTENT: f32 = 0.69;
 const SILHOUETTE_EXTENT: f32 = 0.78;
 const LEAST_SILHOUETTE: f32 = 1.02;
+const AGREEMENT: f32 = 0.1;
 const MAX_RATIO: f32 = 1e3;
 const FAR_INSIDE: f32 = 1e30;
 
 // A neighbour before or after a photon, if it took the same path.
 struct Landed {
     position: vec3<f32>,
+    // Its axis along which it is a neighbour.
+    axis: vec3<f32>,
     object: u32,
     is_there: bool,
 }
@@ -24,6 +27,8 @@ struct Landing {
     ratio: f32,
     // How far inside a silhouette the photon is, in cells; FAR_INSIDE where none is told.
     inside: f32,
+    // Whether the neighbour's differential says the same.
+    is_sure: bool,
     is_there: bool,
     is_edge: bool,
 }
@@ -94,6 +99,9 @@ fn landing_of(
     landing.is_edge = before.is_there != after.is_there;
     if landing.is_edge && landing.ratio > LEAST_SILHOUETTE {
         landing.inside = 1.0 / (4.0 * landing.ratio * (landing.ratio - 1.0));
+        let slope = length / length_of(select(after.axis, before.axis, takes_before));
+        let by_slope = 1.0 / (slope * slope - 1.0);
+        landing.is_sure = slope > 1.0 && abs(landing.inside - by_slope) < AGREEMENT;
     }
     return landing;
 }
@@ -139,8 +147,10 @@ fn checked(
 ) -> CheckedRecord {
     let u = landing_of(photon, photon.axis_u, along[0], along[1]);
     let v = landing_of(photon, photon.axis_v, across[0], across[1]);
-    let is_v_steepest = v.inside < u.inside;
-    let is_last = select(u.inside, v.inside, is_v_steepest) < 1.0;
+    let u_inside = select(FAR_INSIDE, u.inside, u.is_sure);
+    let v_inside = select(FAR_INSIDE, v.inside, v.is_sure);
+    let is_v_steepest = v_inside < u_inside;
+    let is_last = select(u_inside, v_inside, is_v_steepest) < 1.0;
     let by_u = checked_axis(photon.axis_u, u, is_last, !is_v_steepest);
     let by_v = checked_axis(photon.axis_v, v, is_last, is_v_steepest);
     var result = CheckedRecord(photon, by_u.is_replaced || by_v.is_replaced);

@@ -12,7 +12,7 @@ const ORDER_WORKGROUP_SIZE: u32 = 64u;
 @group(0) @binding(6) var<storage, read_write> records: array<FootprintRecord>;
 
 // The first record of a photon that took this path, if there is one.
-fn landed(photon: u32, path: u32) -> Landed {
+fn landed(photon: u32, path: u32, is_along: bool) -> Landed {
     var found = 0u;
     if photon != NO_PHOTON {
         // From the last to the first.
@@ -27,6 +27,11 @@ fn landed(photon: u32, path: u32) -> Landed {
     result.is_there = found != 0u;
     if result.is_there {
         result.position = appended[found - 1u].position;
+        if is_along {
+            result.axis = appended[found - 1u].axis_u;
+        } else {
+            result.axis = appended[found - 1u].axis_v;
+        }
         result.object = appended[found - 1u].object;
     }
     return result;
@@ -65,8 +70,8 @@ fn order_photon(photon: u32) {
         if checks && (before & LINK_THINNED) == 0u {
             let after = checked(
                 record,
-                array(landed(beside[0].x, path), landed(beside[0].y, path)),
-                array(landed(beside[1].x, path), landed(beside[1].y, path)),
+                array(landed(beside[0].x, path, true), landed(beside[0].y, path, true)),
+                array(landed(beside[1].x, path, false), landed(beside[1].y, path, false)),
             );
             count_up(COUNTER_REPLACED, select(0u, 1u, after.is_replaced));
             book_silhouette(flux_of(record), flux_of(after.record));

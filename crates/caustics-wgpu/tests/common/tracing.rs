@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 use caustics_scene::gltf::load_path;
 use caustics_scene::{BvhOptions, SceneIntersector, World};
 use caustics_trace::{
-    EmissionPlan, EnergyLedger, Fate, FootprintSource, Photon, PhotonTrail, TraceOptions,
-    trace_photon, trace_plan,
+    EmissionPlan, EnergyLedger, Fate, FootprintSource, LedgerEntry, Photon, PhotonTrail,
+    TraceOptions, trace_photon, trace_plan,
 };
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
@@ -70,7 +70,13 @@ pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<Photon
         for photon in &mut trail.photons {
             let checked = checked.next().unwrap();
             assert_eq!(photon.incoming, checked.incoming);
-            trail.ledger.silhouette_gain += checked.flux.as_dvec3() - photon.flux.as_dvec3();
+            let gain = checked.flux.as_dvec3() - photon.flux.as_dvec3();
+            trail.ledger.silhouette_gain += gain;
+            let stored = LedgerEntry {
+                count: 0,
+                flux: gain,
+            };
+            trail.ledger.add(Fate::Stored, &stored);
             *photon = checked;
             let is_replaced = photon.source == FootprintSource::Neighbour;
             trail.ledger.replaced_differentials += u64::from(is_replaced);

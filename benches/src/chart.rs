@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use caustics_benches::stage::Failure;
+use crate::stage::Failure;
 
 const COLUMNS: usize = 2;
 const PANEL: [f64; 2] = [470.0, 310.0];
@@ -18,26 +18,34 @@ const COLORS: [&str; 7] = [
 ];
 
 /// A line of a panel.
-pub(crate) struct Line {
+#[derive(Clone, Debug)]
+pub struct Line {
     /// Which of the chart's names it has.
-    pub(crate) name: usize,
-    pub(crate) points: Vec<[f64; 2]>,
+    pub name: usize,
+    /// From left to right.
+    pub points: Vec<[f64; 2]>,
     /// Whether it is what others are to be held against.
-    pub(crate) is_dashed: bool,
+    pub is_dashed: bool,
 }
 
 /// Lines with axes of their own.
-pub(crate) struct Panel {
-    pub(crate) title: String,
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Above the panel.
+    pub title: String,
     /// What is along the axes, with units.
-    pub(crate) labels: [&'static str; 2],
+    pub labels: [&'static str; 2],
     /// Whether an axis is of powers of ten.
-    pub(crate) powers: [bool; 2],
-    pub(crate) lines: Vec<Line>,
+    pub powers: [bool; 2],
+    /// In the order in which they are drawn.
+    pub lines: Vec<Line>,
 }
 
-/// Writes panels under a legend to a file beside the page.
-pub(crate) fn write(file: &str, names: &[&str], panels: &[Panel]) -> Result<(), Failure> {
+/// Writes panels under a legend to a file beside the pages of the documentation.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(file: &str, names: &[&str], panels: &[Panel]) -> Result<(), Failure> {
     let width = COLUMNS as f64 * PANEL[0];
     let per_row = (width / ENTRY_WIDTH) as usize;
     let legend = 12.0 + ENTRY_HEIGHT * names.len().div_ceil(per_row) as f64;
