@@ -25,14 +25,12 @@ pub(crate) struct Silhouette {
     pub(crate) is_sure: bool,
 }
 
-/// The part of the light at a silhouette that a photon stands for.
+/// Where the light of a cell at a silhouette lands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Share {
-    /// In the light of whole cells.
-    pub(crate) cells: f32,
-    /// How far from the photon towards its neighbour the light's middle is, in their distance.
+pub(crate) struct Fit {
+    /// How far from the photon towards its neighbour its middle is, in their distance.
     pub(crate) inwards: f32,
-    /// How wide the light is, in that distance.
+    /// How wide it is, in that distance.
     pub(crate) extent: f32,
 }
 
@@ -51,16 +49,20 @@ impl Silhouette {
         })
     }
 
-    /// The light between x - 1/2, or the silhouette where that is nearer or the photon is the `last`
-    /// of its row, and x + 1/2.
+    /// How many cells' light is between the silhouette and the far side of the photon's cell, if the
+    /// photon is the last of its row: it stands for all of that.
+    pub(crate) fn cells(&self) -> Option<f32> {
+        (self.is_sure && self.inside < 1.0).then_some(self.inside + 0.5)
+    }
+
+    /// The light between x - 1/2, or the silhouette where that is nearer, and x + 1/2.
     ///
     /// With s and d for the sum and the difference of the roots of its ends, the mean of where it
     /// lands is s / 2 + d² / (6 s) and the variance d² / 12 (1 - d² / (3 s²)), in which nothing
     /// cancels.
-    pub(crate) fn share(&self, last: bool) -> Share {
+    pub(crate) fn fit(&self) -> Fit {
         let x = self.inside;
-        let low = if last { 0.0 } else { (x - 0.5).max(0.0) };
-        let high = x + 0.5;
+        let (low, high) = ((x - 0.5).max(0.0), x + 0.5);
         // In c.
         let sum = low.sqrt() + high.sqrt();
         let difference = (high - low) / sum;
@@ -70,8 +72,7 @@ impl Silhouette {
         let width = difference * (1.0 - skew * skew / 3.0).sqrt();
         // c in the distance to the neighbour.
         let scale = 2.0 * self.ratio * x.sqrt();
-        Share {
-            cells: if last { high } else { 1.0 },
+        Fit {
             inwards: scale * (mean - x.sqrt()),
             extent: EXTENT * scale * width,
         }

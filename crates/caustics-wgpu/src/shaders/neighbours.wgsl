@@ -37,21 +37,14 @@ struct CheckedAxis {
     axis: vec3<f32>,
     // What the footprint's middle is moved by.
     shift: vec3<f32>,
-    // Of how many cells the flux is.
-    cells: f32,
     // Whether a neighbour stood in for the differential.
     is_replaced: bool,
 }
 
-// The part of the light at a silhouette that a photon stands for. Twin: `Share` in silhouette.rs.
-struct Share {
-    cells: f32,
-    inwards: f32,
-    extent: f32,
-}
-
-fn silhouette_share(ratio: f32, x: f32, is_last: bool) -> Share {
-    let low = select(max(x - 0.5, 0.0), 0.0, is_last);
+// Where the light of a cell at a silhouette lands: how far inwards, and how wide, in the distance to
+// the one neighbour. Twin: `Silhouette::fit`.
+fn silhouette_fit(ratio: f32, x: f32) -> vec2<f32> {
+    let low = max(x - 0.5, 0.0);
     let high = x + 0.5;
     let sum = sqrt(low) + sqrt(high);
     let difference = (high - low) / sum;
@@ -59,11 +52,7 @@ fn silhouette_share(ratio: f32, x: f32, is_last: bool) -> Share {
     let skew = difference / sum;
     let width = difference * sqrt(1.0 - skew * skew / 3.0);
     let scale = 2.0 * ratio * sqrt(x);
-    return Share(
-        select(1.0, high, is_last),
-        scale * (mean - sqrt(x)),
-        SILHOUETTE_EXTENT * scale * width,
-    );
+    return vec2(scale * (mean - sqrt(x)), SILHOUETTE_EXTENT * scale * width);
 }
 
 fn landing_of(
@@ -106,32 +95,23 @@ fn landing_of(
     return landing;
 }
 
-// `is_last` where a silhouette is within a cell, along the axis that is `steepest` or along the other.
-fn checked_axis(
-    axis: vec3<f32>,
-    landing: Landing,
-    is_last: bool,
-    is_steepest: bool,
-) -> CheckedAxis {
+fn checked_axis(axis: vec3<f32>, landing: Landing) -> CheckedAxis {
     if !landing.is_there {
-        return CheckedAxis(axis, vec3(0.0), 1.0, false);
+        return CheckedAxis(axis, vec3(0.0), false);
     }
-    var share = Share(1.0, 0.0, 1.0);
-    var is_fitted = false;
-    if landing.inside < FAR_INSIDE {
-        if !is_last || is_steepest {
-            is_fitted = true;
-            share = silhouette_share(landing.ratio, landing.inside, is_last);
-        }
+    // Inwards, and how wide.
+    var fit = vec2(0.0, 1.0);
+    let is_fitted = landing.inside < FAR_INSIDE;
+    if is_fitted {
+        fit = silhouette_fit(landing.ratio, landing.inside);
     } else if landing.is_edge {
-        share.inwards = EDGE_SHIFT;
-        share.extent = EDGE_EXTENT;
+        fit = vec2(EDGE_SHIFT, EDGE_EXTENT);
     }
     let is_replaced = landing.ratio > LIMIT || is_fitted;
     let unit = select(axis, landing.farthest, is_replaced);
     // The axis may point either way.
     let side = sign_of(dot(landing.farthest, unit));
-    return CheckedAxis(share.extent * unit, share.inwards * side * unit, share.cells, is_replaced);
+    return CheckedAxis(fit.y * unit, fit.x * side * unit, is_replaced);
 }
 
 struct CheckedRecord {
@@ -147,18 +127,17 @@ fn checked(
 ) -> CheckedRecord {
     let u = landing_of(photon, photon.axis_u, along[0], along[1]);
     let v = landing_of(photon, photon.axis_v, across[0], across[1]);
-    let u_inside = select(FAR_INSIDE, u.inside, u.is_sure);
-    let v_inside = select(FAR_INSIDE, v.inside, v.is_sure);
-    let is_v_steepest = v_inside < u_inside;
-    let is_last = select(u_inside, v_inside, is_v_steepest) < 1.0;
-    let by_u = checked_axis(photon.axis_u, u, is_last, !is_v_steepest);
-    let by_v = checked_axis(photon.axis_v, v, is_last, is_v_steepest);
+    let inside = min(
+        select(FAR_INSIDE, u.inside, u.is_sure), select(FAR_INSIDE, v.inside, v.is_sure));
+    let by_u = checked_axis(photon.axis_u, u);
+    let by_v = checked_axis(photon.axis_v, v);
     var result = CheckedRecord(photon, by_u.is_replaced || by_v.is_replaced);
     result.record.position = result.record.position + by_u.shift;
     result.record.position = result.record.position + by_v.shift;
     result.record.axis_u = by_u.axis;
     result.record.axis_v = by_v.axis;
-    let cells = by_u.cells * by_v.cells;
+    // The last photon of a row has all its light from the silhouette on.
+    let cells = select(1.0, inside + 0.5, inside < 1.0);
     result.record.flux_r *= cells;
     result.record.flux_g *= cells;
     result.record.flux_b *= cells;
