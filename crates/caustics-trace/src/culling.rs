@@ -147,7 +147,7 @@ impl Culling {
             }
             let more = photon.flux / survival;
             ledger.gain(more - photon.flux);
-            ledger.strengthen(more - photon.flux);
+            ledger.strengthen((more - photon.flux).as_dvec3());
             photon.flux = more;
             // Survivors stand farther apart.
             photon.axes = photon.axes.map(|axis| survival.sqrt().recip() * axis);

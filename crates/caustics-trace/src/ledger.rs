@@ -188,8 +188,8 @@ impl EnergyLedger {
         self.roulette_gain += flux.as_dvec3();
     }
 
-    /// Books what photons that are stored have more, in watts.
-    pub(crate) fn gain_stored(&mut self, flux: DVec3) {
+    /// Adds flux to photons that are stored, in watts.
+    pub(crate) fn strengthen(&mut self, flux: DVec3) {
         self.fates[Fate::Stored as usize].flux += flux;
     }
 
@@ -208,11 +208,6 @@ impl EnergyLedger {
         for photon in photons {
             self.book(Fate::Stored, photon.flux);
         }
-    }
-
-    /// Adds flux to a stored photon.
-    pub(crate) fn strengthen(&mut self, flux: Vec3) {
-        self.fates[Fate::Stored as usize].flux += flux.as_dvec3();
     }
 
     /// What one photon did, as a short list, and back.

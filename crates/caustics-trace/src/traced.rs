@@ -75,7 +75,7 @@ impl Traced {
             let before = self.ledger.silhouette_gain;
             self.photons = self.checked(planned.lattice(), 0..count);
             let gain = self.ledger.silhouette_gain - before;
-            self.ledger.gain_stored(gain);
+            self.ledger.strengthen(gain);
         }
     }
 

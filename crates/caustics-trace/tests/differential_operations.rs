@@ -286,9 +286,10 @@ proptest! {
         ..ProptestConfig::with_cases(5_000)
     })]
 
-    /// With two parameters the axes are the displacements, with four a square of the area that is said.
+    /// With two parameters the axes are the displacements; with four their covariance is a part of that
+    /// of the steps and a disc.
     #[test]
-    fn axes_span_the_area(
+    fn axes_keep_of_the_steps_what_does_not_overlap(
         angles in (-1.0..1.0, 0.0..TAU),
         moved in prop::array::uniform4(vector(-2.0..2.0)),
     ) {
@@ -303,11 +304,19 @@ proptest! {
             let squares = one.length_squared() + other.length_squared();
             one.cross(other).length().max(0.01 * squares)
         });
-        let area = steps + 3.0 * (steps * blurs).sqrt();
-        let [one, other] = axes.map(Vec3::as_dvec3);
-        prop_assert!((one.cross(other).length() - area).abs() < 1e-5 * area);
-        prop_assert!(one.dot(other).abs() < 1e-5 * area);
-        prop_assert!((one.length_squared() - area).abs() < 1e-5 * area);
+        let covered = steps + 3.0 * (steps * blurs).sqrt();
+        let own = steps / covered;
+        for probe in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.6, 0.0, 0.8)] {
+            let probe = across(probe, normal).as_dvec3();
+            let spread = |vectors: &[Vec3]| -> f64 {
+                vectors.iter().map(|it| it.as_dvec3().dot(probe).powi(2)).sum()
+            };
+            let disc = (covered - own * steps) * probe.length_squared();
+            let expected = own * spread(&moved[..2]) + disc;
+            let scale = own * moved[..2].iter().map(|it| f64::from(it.length_squared())).sum::<f64>();
+            let difference = spread(&axes) - expected;
+            prop_assert!(difference.abs() < 1e-5 * (scale + covered), "{difference} of {expected}");
+        }
         for axis in axes {
             prop_assert!(axis.dot(normal).abs() < 1e-6 * axis.length() + f32::MIN_POSITIVE);
         }

@@ -126,12 +126,40 @@ fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2
     if scale == 0.0 {
         return array(vec3(0.0), vec3(0.0));
     }
-    let step = area_of(at_end.position[0] / scale, at_end.position[1] / scale);
-    let blur = area_of(
-        at_end.position[PARAMETERS - 2u] / scale, at_end.position[PARAMETERS - 1u] / scale);
-    let edge = scale * sqrt(step + OVERLAP * sqrt(step * blur));
     let tangents = tangents_of(normal);
-    return array(edge * tangents.first, edge * tangents.second);
+    var steps = array(at_end.position[0] / scale, at_end.position[1] / scale);
+    let step = area_of(steps[0], steps[1]);
+    let overlap = OVERLAP * sqrt(step * area_of(
+        at_end.position[PARAMETERS - 2u] / scale, at_end.position[PARAMETERS - 1u] / scale));
+    // How much of the steps' own shape is left.
+    let covered = step + overlap;
+    var own = 1.0;
+    if covered > 0.0 {
+        own = step / covered;
+    }
+    let disc = covered - own * step;
+    var xx = disc;
+    var xy = 0.0;
+    var yy = disc;
+    for (var i = 0u; i < 2u; i++) {
+        let moved = sqrt(own) * steps[i];
+        let x = dot(moved, tangents.first);
+        let y = dot(moved, tangents.second);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    // The columns of the covariance's Cholesky factor.
+    let x = sqrt(xx);
+    var shear = 0.0;
+    if x > 0.0 {
+        shear = xy / x;
+    }
+    let y = sqrt(max(yy - shear * shear, 0.0));
+    return array(
+        scale * (x * tangents.first + shear * tangents.second),
+        scale * y * tangents.second,
+    );
 }
 
 fn area_of(one: vec3<f32>, other: vec3<f32>) -> f32 {
