@@ -283,7 +283,7 @@ mod tests {
         // A long step under much blur: 36 + 3 sqrt(36 * 10^6), and round but for a part in 500.
         let long = axes(9.0, 1000.0);
         assert_relative_eq!(area(long), 18036.0, max_relative = 0.01);
-        let [one, other] = long.map(|it| it.length_squared());
+        let [one, other] = long.map(Vec3::length_squared);
         assert_relative_eq!(one.max(other) / one.min(other), 1.0, epsilon = 0.01);
         // Steps that go nowhere say nothing.
         assert_eq!(area(axes(0.0, 0.0)), 0.0);
