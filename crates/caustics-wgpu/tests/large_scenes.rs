@@ -3,6 +3,7 @@
 mod stage;
 
 use caustics_geometry::shapes::{heightfield, quad};
+use caustics_gpu_readback::{read_buffer, read_texture};
 use caustics_scene::{BvhOptions, Camera, Instance, Light, Material, Scene, Shape, Surface, World};
 use caustics_trace::TraceOptions;
 use caustics_wgpu::glam::{Affine3A, Vec3};
@@ -10,7 +11,7 @@ use caustics_wgpu::{
     CausticsRenderer, FrameLight, FrameParams, GpuError, RendererError, RendererOptions,
     SceneBuffers, SplatStats, TraceCounters, TracePlan, wgpu,
 };
-use stage::{Stage, TestError, device_with, read_buffer, read_texture};
+use stage::{Stage, TestError, device_with};
 
 /// Water with ripples of so many triangles over a white or a glossy ground, in the sun.
 fn pool(cells: u32, ground: Surface) -> Result<Scene, TestError> {
