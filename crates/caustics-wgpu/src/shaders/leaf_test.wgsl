@@ -13,6 +13,9 @@ const WIDEN: f32 = 1.0000031;
 // such a ray is well inside.
 const SHORTEST: f32 = 1e-18;
 
+// Nodes that wait on a traversal's stack; the builder sees to it that there are no more.
+const MAX_WAITING: u32 = 64u;
+
 fn inverse_direction(direction: vec3<f32>) -> vec3<f32> {
     let size = max(abs(direction), vec3(SHORTEST));
     return select(1.0 / size, -1.0 / size, direction < vec3(0.0));

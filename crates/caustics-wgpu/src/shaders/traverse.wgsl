@@ -1,4 +1,5 @@
-// The loop over nodes of the binary hierarchy.
+// The closest hit of a ray in the binary hierarchy. Twins: `Intersect::closest_hit` of
+// `SceneIntersector` and `TriangleBvh`, which give the same hits.
 
 // Where the ray enters the box, or `FAR` where it passes by or enters beyond the limit.
 fn enter_box(low: vec3<f32>, high: vec3<f32>, origin: vec3<f32>, inverse: vec3<f32>, limit: f32) -> f32 {
@@ -11,33 +12,45 @@ fn enter_box(low: vec3<f32>, high: vec3<f32>, origin: vec3<f32>, inverse: vec3<f
     return select(FAR, near, near <= far);
 }
 
-fn traverse(ray: Ray, sheared_by: ShearedRay, inverse: vec3<f32>, left: ptr<function, Traversal>) -> u32 {
-    var apart = NO_PRIMITIVE;
-    while (*left).current != NO_PRIMITIVE && apart == NO_PRIMITIVE {
-        let current = (*left).current;
-        let first = nodes[current].first;
-        var next = NO_PRIMITIVE;
-        if nodes[current].is_leaf != 0u {
-            let found = test_leaf(sheared_by, first);
-            apart = select(NO_PRIMITIVE, first, found.t == DOUBTFUL);
-            (*left).closest = closer_hit(found, (*left).closest);
-        } else {
-            let limit = (*left).closest.t * WIDEN;
-            let one = enter_box(nodes[first].low, nodes[first].high, ray.origin, inverse, limit);
-            let other = enter_box(
-                nodes[first + 1u].low, nodes[first + 1u].high, ray.origin, inverse, limit);
-            let one_first = one <= other;
-            if min(one, other) < FAR {
-                next = first + select(1u, 0u, one_first);
+fn closest_hit(ray: Ray) -> Hit {
+    var closest = Hit(FAR, 0.0, 0.0, NO_PRIMITIVE);
+    let sheared_by = sheared_ray(ray);
+    let inverse = inverse_direction(ray.direction);
+    var waiting: array<u32, MAX_WAITING>;
+    var waiting_count = 0u;
+    var current = trace.root;
+    while current != NO_PRIMITIVE {
+        var apart = NO_PRIMITIVE;
+        while current != NO_PRIMITIVE && apart == NO_PRIMITIVE {
+            let first = nodes[current].first;
+            var next = NO_PRIMITIVE;
+            if nodes[current].is_leaf != 0u {
+                let found = test_leaf(sheared_by, first);
+                apart = select(NO_PRIMITIVE, first, found.t == DOUBTFUL);
+                closest = closer_hit(found, closest);
+            } else {
+                let limit = closest.t * WIDEN;
+                let left = enter_box(nodes[first].low, nodes[first].high, ray.origin, inverse, limit);
+                let right = enter_box(
+                    nodes[first + 1u].low, nodes[first + 1u].high, ray.origin, inverse, limit);
+                let left_first = left <= right;
+                if min(left, right) < FAR {
+                    next = first + select(1u, 0u, left_first);
+                }
+                if max(left, right) < FAR {
+                    waiting[waiting_count] = first + select(0u, 1u, left_first);
+                    waiting_count += 1u;
+                }
             }
-            if max(one, other) < FAR {
-                let_wait(left, first + select(0u, 1u, one_first));
+            if next == NO_PRIMITIVE && waiting_count > 0u {
+                waiting_count -= 1u;
+                next = waiting[waiting_count];
             }
+            current = next;
         }
-        if next == NO_PRIMITIVE {
-            next = next_waiting(left);
+        if apart != NO_PRIMITIVE {
+            closest = closer_hit(test_apart(ray, sheared_by, apart), closest);
         }
-        (*left).current = next;
     }
-    return apart;
+    return closest;
 }

@@ -1,5 +1,6 @@
-// The loop over nodes of the hierarchy of four children a node, whose boxes are quantised after
-// Ylitie, Karras and Laine 2017. `Hierarchy` in tracer_shaders.rs says what other forms cost.
+// The closest hit of a ray in the hierarchy of four children a node, whose boxes are quantised after
+// Ylitie, Karras and Laine 2017. Twins: as of traverse.wgsl. `Hierarchy` in tracer_shaders.rs says what
+// other forms cost.
 
 struct Children {
     // Where the ray enters each, or `FAR` where it passes by or enters beyond the limit.
@@ -54,35 +55,55 @@ fn sorted(given: Children) -> Children {
         select(enters, enters.xzyw, swaps_middle), select(nodes, nodes.xzyw, swaps_middle));
 }
 
-fn traverse(ray: Ray, sheared_by: ShearedRay, inverse: vec3<f32>, left: ptr<function, Traversal>) -> u32 {
-    var apart = NO_PRIMITIVE;
-    while (*left).current != NO_PRIMITIVE && apart == NO_PRIMITIVE {
-        while ((*left).current & LEAF_BIT) == 0u {
-            let met = sorted(enter_children(
-                (*left).current, ray.origin, inverse, (*left).closest.t * WIDEN));
-            var next = select(NO_PRIMITIVE, met.nodes.x, met.enters.x < FAR);
-            // The nearest last.
-            if met.enters.w < FAR {
-                let_wait(left, met.nodes.w);
+fn closest_hit(ray: Ray) -> Hit {
+    var closest = Hit(FAR, 0.0, 0.0, NO_PRIMITIVE);
+    let sheared_by = sheared_ray(ray);
+    let inverse = inverse_direction(ray.direction);
+    var waiting: array<u32, MAX_WAITING>;
+    var waiting_count = 0u;
+    var current = trace.root;
+    while current != NO_PRIMITIVE {
+        var apart = NO_PRIMITIVE;
+        while current != NO_PRIMITIVE && apart == NO_PRIMITIVE {
+            while (current & LEAF_BIT) == 0u {
+                var next = NO_PRIMITIVE;
+                let met = sorted(
+                    enter_children(current, ray.origin, inverse, closest.t * WIDEN));
+                next = select(NO_PRIMITIVE, met.nodes.x, met.enters.x < FAR);
+                // The nearest last.
+                if met.enters.w < FAR {
+                    waiting[waiting_count] = met.nodes.w;
+                    waiting_count += 1u;
+                }
+                if met.enters.z < FAR {
+                    waiting[waiting_count] = met.nodes.z;
+                    waiting_count += 1u;
+                }
+                if met.enters.y < FAR {
+                    waiting[waiting_count] = met.nodes.y;
+                    waiting_count += 1u;
+                }
+                if next == NO_PRIMITIVE && waiting_count > 0u {
+                    waiting_count -= 1u;
+                    next = waiting[waiting_count];
+                }
+                current = next;
             }
-            if met.enters.z < FAR {
-                let_wait(left, met.nodes.z);
+            if current != NO_PRIMITIVE {
+                let primitive = current ^ LEAF_BIT;
+                let found = test_leaf(sheared_by, primitive);
+                apart = select(NO_PRIMITIVE, primitive, found.t == DOUBTFUL);
+                closest = closer_hit(found, closest);
+                current = NO_PRIMITIVE;
+                if waiting_count > 0u {
+                    waiting_count -= 1u;
+                    current = waiting[waiting_count];
+                }
             }
-            if met.enters.y < FAR {
-                let_wait(left, met.nodes.y);
-            }
-            if next == NO_PRIMITIVE {
-                next = next_waiting(left);
-            }
-            (*left).current = next;
         }
-        if (*left).current != NO_PRIMITIVE {
-            let primitive = (*left).current ^ LEAF_BIT;
-            let found = test_leaf(sheared_by, primitive);
-            apart = select(NO_PRIMITIVE, primitive, found.t == DOUBTFUL);
-            (*left).closest = closer_hit(found, (*left).closest);
-            (*left).current = next_waiting(left);
+        if apart != NO_PRIMITIVE {
+            closest = closer_hit(test_apart(ray, sheared_by, apart), closest);
         }
     }
-    return apart;
+    return closest;
 }
