@@ -291,6 +291,8 @@ impl Viewer {
                 };
                 self.orbit.zoom(0.9f32.powf(lines));
             }
+            // A frame may take seconds on a software adapter: none after the last.
+            WindowEvent::RedrawRequested if event_loop.exiting() => {}
             WindowEvent::RedrawRequested => {
                 self.draw()?;
                 if self
