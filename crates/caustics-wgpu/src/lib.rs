@@ -103,9 +103,9 @@
 //! Photons land in any order; then their records are put in that of the photons, by a prefix sum over
 //! how many each has. On the way, each footprint of a lattice is checked against where the photons
 //! beside it landed on the same path, as
-//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says: so the records are
-//! those of the CPU's photons, in their order, the same bits in every run. Sums of energy are
-//! integers and do not depend on any order.
+//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says, and the last one before
+//! a silhouette gets the light up to it: so the records are those of the CPU's photons, in their
+//! order, the same bits in every run. Sums of energy are integers and do not depend on any order.
 //!
 //! # How a splat is made
 //!
