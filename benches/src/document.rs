@@ -1,6 +1,20 @@
 //! A Markdown file between whose marks tables are rewritten.
 
+use std::fs;
+use std::path::Path;
+
 use crate::stage::Failure;
+
+/// Rewrites a document's tables, as [`with_tables`] says.
+///
+/// # Errors
+/// If it cannot be read or written, or a pair of marks is missing.
+pub fn rewrite(path: &Path, tables: &[(&'static str, String)]) -> Result<(), Failure> {
+    let named = |error| format!("{}: {error}", path.display());
+    let document = fs::read_to_string(path).map_err(named)?;
+    fs::write(path, with_tables(&document, tables)?).map_err(named)?;
+    Ok(())
+}
 
 /// Puts each table between the marks `<!-- begin: NAME -->` and `<!-- end: NAME -->` of its name.
 ///

@@ -1,11 +1,13 @@
 //! What the benchmarks of this workspace have in common: meshes, rays, photons and peers.
 
 pub mod chart;
+pub mod command;
 pub mod conditions;
 pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod flip;
+pub mod gpu;
 pub mod meshes;
 #[cfg(feature = "nanoflann-cpp")]
 pub mod nanoflann_cpp;

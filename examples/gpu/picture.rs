@@ -4,11 +4,12 @@ use std::path::Path;
 
 use caustics::filter::{Display, Image, write_png as write};
 use caustics::prelude::{Light, Scene, TraceOptions};
+use caustics_gpu_readback::{read, read_texture, reading_buffer};
 use caustics_wgpu::{Capabilities, PreparedFrame, RecordedWork, SplatOptions, SplatStats};
 
 use crate::Failure;
 use crate::engine::Look;
-use crate::headless::{device, read, read_texture, reading_buffer};
+use crate::headless::device;
 use crate::stage::Stage;
 
 /// Passes by name, and the milliseconds that each took.

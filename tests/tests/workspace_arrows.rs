@@ -7,7 +7,7 @@ use caustics_tests::TestError;
 use serde_json::Value;
 
 /// What each library may depend on, in code, build scripts and tests.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("caustics-geometry", &[]),
     ("caustics-sampling", &[]),
     ("caustics-filter", &[]),
@@ -21,11 +21,19 @@ const ARROWS: [(&str, &[&str]); 9] = [
         "caustics-render",
         &["trace", "filter", "sampling", "scene", "accel", "geometry"],
     ),
-    // Its tests compare it with its twins in `render`.
+    ("caustics-gpu-readback", &[]),
+    // Its tests compare it with its twins in `render`, and read back from its device.
     (
         "caustics-wgpu",
         &[
-            "render", "trace", "filter", "sampling", "scene", "accel", "geometry",
+            "gpu-readback",
+            "render",
+            "trace",
+            "filter",
+            "sampling",
+            "scene",
+            "accel",
+            "geometry",
         ],
     ),
     (

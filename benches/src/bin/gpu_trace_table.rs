@@ -11,13 +11,13 @@
 //! prints them. Bytes are those of the buffers, each counted once; a dispatch writes its records and
 //! reads the scene through caches.
 
-use std::error::Error;
 use std::path::PathBuf;
 
 use caustics_benches::conditions::conditions;
-use caustics_benches::document::with_tables;
-use caustics_scene::gltf::load_path;
-use caustics_scene::{BvhOptions, World};
+use caustics_benches::document::rewrite;
+use caustics_benches::gpu::Gpu;
+use caustics_benches::stage::{Failure, SCENES, Stage};
+use caustics_scene::World;
 use caustics_trace::{EmissionPlan, Photon, PhotonMap, TraceOptions, trace_plan};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
@@ -25,26 +25,6 @@ use caustics_wgpu::{
 };
 
 const ROUNDS: usize = 5;
-
-const SCENES: [&str; 10] = [
-    "p01_sphere",
-    "p02_sphere_box",
-    "p03_cognac",
-    "p04_sphere_in_box",
-    "p05_brass_ring",
-    "p06_wave_plane",
-    "p07_pool",
-    "p08_square",
-    "p09_cornell",
-    "p10_torus_cube",
-];
-
-struct Gpu {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-    /// One for each [`Hierarchy`].
-    tracers: [PhotonTracer; 2],
-}
 
 /// What is measured of a scene.
 struct Row {
@@ -75,19 +55,21 @@ struct Parity {
     axes: f32,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Failure> {
     let mut arguments = std::env::args().skip(1);
     let photons = arguments.next().map_or(Ok(20_000), |it| it.parse())?;
     let asked: Vec<String> = arguments.collect();
-    let (gpu, name) = pollster::block_on(open())?;
+    let gpu = Gpu::new()?;
+    // One for each.
+    let tracers = Hierarchy::ALL.map(|it| PhotonTracer::with_hierarchy(&gpu.device, it));
     let mut rows = Vec::new();
     for scene in SCENES {
         if asked.is_empty() || asked.iter().any(|it| it == scene) {
             eprintln!("{scene}");
-            rows.push(measured(&gpu, scene, photons)?);
+            rows.push(measured(&gpu, &tracers, scene, photons)?);
         }
     }
-    let now = conditions(&name);
+    let now = conditions(&gpu.name);
     let section = format!(
         "{photons} photons a scene, medians of {ROUNDS} runs of each in turn: {}, beside {} threads \
          of the CPU; {}, commit {}.\n\n{}",
@@ -100,41 +82,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{section}");
     if rows.len() == SCENES.len() {
         let path = [env!("CARGO_MANIFEST_DIR"), "../docs/gpu.md"];
-        let path: PathBuf = path.iter().collect();
-        let document = std::fs::read_to_string(&path)?;
-        std::fs::write(
-            &path,
-            with_tables(&document, &[("trace", section)]).map_err(|it| it.to_string())?,
-        )?;
+        rewrite(&path.iter().collect::<PathBuf>(), &[("trace", section)])?;
     }
     Ok(())
 }
 
-async fn open() -> Result<(Gpu, String), Box<dyn Error>> {
-    let instance = wgpu::Instance::default();
-    let adapter = instance
-        .request_adapter(&wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            ..wgpu::RequestAdapterOptions::default()
-        })
-        .await?;
-    let info = adapter.get_info();
-    let (device, queue) = adapter
-        .request_device(&wgpu::DeviceDescriptor::default())
-        .await?;
-    let tracers = Hierarchy::ALL.map(|it| PhotonTracer::with_hierarchy(&device, it));
-    let gpu = Gpu {
-        device,
-        queue,
-        tracers,
-    };
-    Ok((gpu, format!("{} ({:?})", info.name, info.backend)))
-}
-
-fn measured(gpu: &Gpu, name: &'static str, photons: u32) -> Result<Row, Box<dyn Error>> {
-    let path = format!("{}/../tests/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
-    let world = World::new(&load_path(path)?.scene)?;
-    let rays = world.intersector(&BvhOptions::default())?;
+fn measured(
+    gpu: &Gpu,
+    tracers: &[PhotonTracer; 2],
+    name: &'static str,
+    photons: u32,
+) -> Result<Row, Failure> {
+    let Stage {
+        world,
+        intersector: rays,
+        ..
+    } = Stage::load(name)?;
     let options = TraceOptions {
         photons,
         ..TraceOptions::default()
@@ -146,15 +109,12 @@ fn measured(gpu: &Gpu, name: &'static str, photons: u32) -> Result<Row, Box<dyn 
     let buffers = PhotonBuffers::new(&gpu.device, photons, capacity.min(1_600_000) as u32)?;
 
     let by_cpu = || trace_plan(&world, &rays, &emission, &options, &|_| {});
-    let on_gpu = |tracer: &PhotonTracer| -> Result<u32, Box<dyn Error>> {
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        buffers.clear(&mut encoder);
-        let all = 0..plan.photons();
-        let work = tracer.trace(&gpu.device, &mut encoder, &scene, &plan, all, &buffers)?;
-        gpu.queue.submit([encoder.finish()]);
-        gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+    let on_gpu = |tracer: &PhotonTracer| -> Result<u32, Failure> {
+        let work = gpu.run(|encoder| {
+            buffers.clear(encoder);
+            let all = 0..plan.photons();
+            Ok(tracer.trace(&gpu.device, encoder, &scene, &plan, all, &buffers)?)
+        })?;
         Ok(work.dispatches)
     };
     let expected = by_cpu()?;
@@ -162,19 +122,20 @@ fn measured(gpu: &Gpu, name: &'static str, photons: u32) -> Result<Row, Box<dyn 
     let mut parity = Parity::default();
     let mut replaced = 0;
     // The first run also compiles the shader on some adapters.
-    for tracer in &gpu.tracers {
+    for tracer in tracers {
         dispatches = on_gpu(tracer)?;
-        let counters = TraceCounters::new(&read(gpu, buffers.counters())?, &plan)?;
-        let records = read(gpu, buffers.records())?;
-        let records: &[FootprintRecord] = bytemuck::cast_slice(&records);
-        let stored = &records[..counters.stored as usize];
+        let words = gpu.read(buffers.counters(), 4 * TraceCounters::WORDS as u64)?;
+        let counters = TraceCounters::new(&bytemuck::pod_collect_to_vec(&words), &plan)?;
+        let bytes = u64::from(counters.stored) * size_of::<FootprintRecord>() as u64;
+        let stored: Vec<FootprintRecord> =
+            bytemuck::pod_collect_to_vec(&gpu.read(buffers.records(), bytes)?);
         replaced = counters.ledger.replaced_differentials;
-        parity = compared(&world, &expected, stored).map_err(|it| format!("{name}: {it}"))?;
+        parity = compared(&world, &expected, &stored).map_err(|it| format!("{name}: {it}"))?;
     }
     let mut seconds = [const { Vec::new() }; 3];
     for _ in 0..ROUNDS {
-        seconds[0].push(timed(|| by_cpu().map_err(Box::from))?);
-        for (seconds, tracer) in seconds[1..].iter_mut().zip(&gpu.tracers) {
+        seconds[0].push(timed(|| Ok(by_cpu()?))?);
+        for (seconds, tracer) in seconds[1..].iter_mut().zip(tracers) {
             seconds.push(timed(|| on_gpu(tracer))?);
         }
     }
@@ -196,7 +157,7 @@ fn measured(gpu: &Gpu, name: &'static str, photons: u32) -> Result<Row, Box<dyn 
     })
 }
 
-fn timed<T>(run: impl FnOnce() -> Result<T, Box<dyn Error>>) -> Result<f64, Box<dyn Error>> {
+fn timed<T>(run: impl FnOnce() -> Result<T, Failure>) -> Result<f64, Failure> {
     let start = std::time::Instant::now();
     run()?;
     Ok(start.elapsed().as_secs_f64())
@@ -293,23 +254,4 @@ fn tables(rows: &[Row]) -> String {
              footprints that the check replaced. *Batch* is all memory that tracing these photons occupies\n\
              besides the scene.\n";
     text
-}
-
-/// The words of a buffer.
-fn read(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u32>, Box<dyn Error>> {
-    let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size: buffer.size(),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu
-        .device
-        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-    gpu.queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |_| {});
-    gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
-    let view = staging.get_mapped_range(..)?;
-    Ok(bytemuck::cast_slice(&view).to_vec())
 }

@@ -1,12 +1,14 @@
 use bytemuck::{Pod, Zeroable};
 
-use crate::error_scope::{caught, filled_buffer, storage_buffer};
+use crate::buffers::{bound_buffer, filled_buffer};
+use crate::error_scope::caught;
+use crate::gather_counts::GatherCounts;
+use crate::gather_options::GatherOptions;
 use crate::pass_layout::{PassLayout, Slot, compute_pipeline};
 use crate::prefix_sum::PrefixSumPass;
 use crate::recorder::Recorder;
 use crate::renderer_error::RendererError;
 use crate::shader::{FOOTPRINT_RECORD, Shader, shader_piece};
-use crate::splat_options::SplatKernel;
 use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, GROUP};
 use crate::{FootprintRecord, GpuError};
 
@@ -82,90 +84,6 @@ pub struct GatherPoint {
     pub object_plus_one: u32,
 }
 
-/// How a [`Gather`] is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GatherOptions {
-    /// The shape of a footprint.
-    pub kernel: SplatKernel,
-    /// Standard deviation of the kernel along a footprint's axis, in sample spacings; above 0.
-    pub scale: f32,
-    /// The longer axis may be at most this many times the shorter one, which is widened; at least
-    /// 1, and infinite for no limit.
-    pub max_anisotropy: f32,
-    /// The least standard deviation of a footprint, in metres: a narrower one is widened to it and
-    /// counted, because a point or a line has no area to divide the flux by. Above 0; a thousandth
-    /// of what is to be seen sharp is enough.
-    pub least_extent: f32,
-    /// The largest extent of a footprint's axis times the scale, in metres: a longer one is
-    /// shortened and counted. At least the least, and at most 2^27 times that.
-    pub most_extent: f32,
-    /// Footprints that there is room for, at most 2^27.
-    pub capacity: u32,
-    /// Room for pairs of a footprint and a cell that its box touches, for each footprint: 1 to 8.
-    /// In 8 all fit.
-    pub entries_per_footprint: u32,
-}
-
-impl Default for GatherOptions {
-    fn default() -> Self {
-        Self {
-            kernel: SplatKernel::default(),
-            scale: 0.55,
-            max_anisotropy: f32::INFINITY,
-            least_extent: 1e-5,
-            most_extent: 1e3,
-            capacity: 1 << 18,
-            entries_per_footprint: 8,
-        }
-    }
-}
-
-/// What became of the footprints that a [`Gather`] was built from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct GatherCounts {
-    /// Footprints that can be found.
-    pub stored: u32,
-    /// Of these, footprints that were widened to the least extent.
-    pub widened: u32,
-    /// Of these, footprints that were shortened to the largest extent.
-    pub shortened: u32,
-    /// Footprints left out because their numbers are not finite.
-    pub invalid: u32,
-    /// Pairs of a footprint and a list.
-    pub entries: u32,
-    /// Of these, pairs for which there was no room: light that is missing.
-    pub dropped_entries: u32,
-}
-
-impl GatherCounts {
-    /// Bytes of the counts in a buffer.
-    pub const BYTES: u64 = 32;
-
-    /// From the bytes that the GPU wrote; `None` if there are fewer than [`BYTES`](Self::BYTES).
-    #[must_use]
-    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let words: [u32; 8] =
-            bytemuck::try_pod_read_unaligned(bytes.get(..Self::BYTES as usize)?).ok()?;
-        let [
-            stored,
-            widened,
-            shortened,
-            invalid,
-            entries,
-            dropped_entries,
-            ..,
-        ] = words;
-        Some(Self {
-            stored,
-            widened,
-            shortened,
-            invalid,
-            entries,
-            dropped_entries,
-        })
-    }
-}
-
 /// The caustics at any point of the scene, from the same footprints that a splat draws: for what
 /// is seen in a mirror or through glass, for baking, and for whatever asks.
 ///
@@ -207,16 +125,7 @@ impl Gather {
     }
 
     fn made(device: &wgpu::Device, options: &GatherOptions) -> Result<Self, RendererError> {
-        let limits = device.limits();
-        let limit = limits
-            .max_storage_buffer_binding_size
-            .min(limits.max_buffer_size);
-        let make = |what: &'static str, bytes: u64, usage| {
-            if bytes > limit {
-                return Err(GpuError::BufferTooLarge { what, bytes, limit });
-            }
-            Ok(storage_buffer(device, what, bytes, usage))
-        };
+        let make = |what, bytes, usage| bound_buffer(device, what, bytes, usage);
         let capacity = u64::from(options.capacity);
         let lists = options
             .capacity
@@ -429,61 +338,6 @@ impl Gather {
     }
 }
 
-impl GatherOptions {
-    /// Checks every number.
-    ///
-    /// # Errors
-    /// An option out of its range.
-    pub fn validate(&self) -> Result<(), RendererError> {
-        let is_positive = |it: f32| it > 0.0 && it.is_finite();
-        let most = self.least_extent * (1u32 << 27) as f32;
-        let checks = [
-            (
-                "scale",
-                self.scale,
-                is_positive(self.scale),
-                "above 0 and finite",
-            ),
-            (
-                "max_anisotropy",
-                self.max_anisotropy,
-                self.max_anisotropy >= 1.0,
-                "at least 1",
-            ),
-            (
-                "least_extent",
-                self.least_extent,
-                is_positive(self.least_extent),
-                "above 0 and finite",
-            ),
-            (
-                "most_extent",
-                self.most_extent,
-                self.most_extent >= self.least_extent && self.most_extent <= most,
-                "1 to 2^27 times the least",
-            ),
-            (
-                "capacity",
-                self.capacity as f32,
-                self.capacity <= 1 << 27,
-                "at most 2^27",
-            ),
-            (
-                "entries_per_footprint",
-                self.entries_per_footprint as f32,
-                (1..=8).contains(&self.entries_per_footprint),
-                "1 to 8",
-            ),
-        ];
-        match checks.into_iter().find(|&(_, _, is_valid, _)| !is_valid) {
-            Some((name, value, _, range)) => {
-                Err(RendererError::OptionOutOfRange { name, value, range })
-            }
-            None => Ok(()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -532,24 +386,5 @@ mod tests {
             .collect();
         bindings.sort_unstable();
         assert_eq!(bindings, [(0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5)]);
-    }
-
-    #[test]
-    fn options_out_of_range_are_named() {
-        let default = GatherOptions::default();
-        assert_eq!(default.validate(), Ok(()));
-        let most_extent = 1e9;
-        let error = GatherOptions {
-            most_extent,
-            ..default
-        }
-        .validate()
-        .unwrap_err();
-        let expected = RendererError::OptionOutOfRange {
-            name: "most_extent",
-            value: 1e9,
-            range: "1 to 2^27 times the least",
-        };
-        assert_eq!(error, expected);
     }
 }

@@ -103,9 +103,9 @@
 //! Photons land in any order; then their records are put in that of the photons, by a prefix sum over
 //! how many each has. On the way, each footprint of a lattice is checked against where the photons
 //! beside it landed on the same path, as
-//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says: so the records are
-//! those of the CPU's photons, in their order, the same bits in every run. Sums of energy are
-//! integers and do not depend on any order.
+//! [`check_footprints`](caustics_trace::TraceOptions::check_footprints) says, and the last one before
+//! a silhouette gets the light up to it: so the records are those of the CPU's photons, in their
+//! order, the same bits in every run. Sums of energy are integers and do not depend on any order.
 //!
 //! # How a splat is made
 //!
@@ -148,6 +148,7 @@
 //! frames. The rest is this workspace's own, and is derived where it stands.
 
 mod body_order;
+mod buffers;
 mod camera_matrix;
 mod capabilities;
 mod composite;
@@ -155,6 +156,8 @@ mod error;
 mod error_scope;
 mod footprint_record;
 mod gather;
+mod gather_counts;
+mod gather_options;
 mod gpu_scene;
 mod pass_layout;
 mod pass_times;
@@ -172,14 +175,18 @@ mod shader;
 mod splat;
 mod splat_options;
 mod splat_quads;
+mod splat_receivers;
 mod splat_scratch;
 mod splat_stats;
+mod splat_steps;
 mod splat_targets;
 mod splat_tiles;
 mod splat_view;
 mod trace_counters;
+mod trace_dispatch;
 mod trace_params;
 mod trace_plan;
+mod tracer_shaders;
 mod view_params;
 mod wide_hierarchy;
 
@@ -188,11 +195,13 @@ pub use capabilities::Capabilities;
 pub use composite::CompositeTarget;
 pub use error::GpuError;
 pub use footprint_record::FootprintRecord;
-pub use gather::{Gather, GatherCounts, GatherOptions, GatherPoint};
+pub use gather::{Gather, GatherPoint};
+pub use gather_counts::GatherCounts;
+pub use gather_options::GatherOptions;
 pub use glam;
 pub use pass_times::{FrameTimestamps, PassTime};
 pub use photon_buffers::PhotonBuffers;
-pub use photon_tracer::{Hierarchy, PhotonTracer};
+pub use photon_tracer::PhotonTracer;
 pub use recorder::RecordedWork;
 pub use renderer::{CausticsRenderer, FrameLight, FrameParams, PreparedFrame, RendererOptions};
 pub use renderer_error::{MissingLimit, RendererError};
@@ -203,5 +212,6 @@ pub use splat_scratch::FootprintBatch;
 pub use splat_stats::SplatStats;
 pub use trace_counters::TraceCounters;
 pub use trace_plan::TracePlan;
+pub use tracer_shaders::Hierarchy;
 pub use view_params::{NormalEncoding, SurfaceInput, ViewParams};
 pub use wgpu;

@@ -1,7 +1,6 @@
 use crate::FootprintRecord;
-use crate::error_scope::storage_buffer;
+use crate::buffers::{fits, storage_buffer};
 use crate::renderer_error::RendererError;
-use crate::scene_buffers::fits;
 use crate::trace_counters::TraceCounters;
 
 /// Room for photons of other batches that are traced as neighbours of a batch's own: up to a row of

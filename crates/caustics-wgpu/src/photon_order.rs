@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::error_scope::filled_buffer;
+use crate::buffers::filled_buffer;
 use crate::pass_layout::{PassLayout, Slot};
 use crate::photon_buffers::PhotonBuffers;
 use crate::prefix_sum::PrefixSumPass;

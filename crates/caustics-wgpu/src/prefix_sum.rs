@@ -1,6 +1,6 @@
 use bytemuck::{Pod, Zeroable};
 
-use crate::error_scope::{filled_buffer, storage_buffer};
+use crate::buffers::{filled_buffer, storage_buffer};
 use crate::pass_layout::{PassLayout, Slot};
 use crate::renderer_error::RendererError;
 use crate::shader::{Shader, shader_piece};

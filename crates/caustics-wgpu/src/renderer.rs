@@ -1,16 +1,18 @@
 use glam::UVec2;
 
+use crate::buffers::{filled_buffer, largest_binding};
 use crate::capabilities::{self, Capabilities, REQUIRED_FEATURES, USED_FEATURES};
 use crate::composite::{Composite, CompositePass, CompositeTarget};
-use crate::error_scope::{caught, filled_buffer};
+use crate::error_scope::caught;
 use crate::pass_times::{FrameTimestamps, PassTimer};
 use crate::photon_buffers::PhotonBuffers;
 use crate::photon_tracer::PhotonTracer;
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
-use crate::splat::{Receivers, Splat};
+use crate::splat::Splat;
 use crate::splat_options::SplatOptions;
+use crate::splat_receivers::Receivers;
 use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, SPLATS_PER_FOOTPRINT, SplatScratch};
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::levels;
@@ -450,9 +452,7 @@ fn photon_batches(limits: &wgpu::Limits, records_per_photon: u32, photons: u32) 
 
 /// Footprints whose records and densities one binding holds, and one dispatch reaches.
 fn footprints_per_batch(limits: &wgpu::Limits) -> u32 {
-    let bytes = limits
-        .max_storage_buffer_binding_size
-        .min(limits.max_buffer_size);
+    let bytes = largest_binding(limits);
     let densities = DENSITY_BYTES * u64::from(SPLATS_PER_FOOTPRINT);
     let each = (size_of::<FootprintRecord>() as u64).max(densities);
     let dispatched = 128 * u64::from(limits.max_compute_workgroups_per_dimension);

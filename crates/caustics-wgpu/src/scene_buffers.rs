@@ -3,9 +3,8 @@ use std::ops::Range;
 use bytemuck::Pod;
 use caustics_scene::World;
 
-use crate::GpuError;
 use crate::body_order::BodyOrder;
-use crate::error_scope::filled_buffer;
+use crate::buffers::{filled_buffer, fits};
 use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex, WideNode};
 use crate::renderer_error::RendererError;
 use crate::scene_hierarchy::SceneHierarchy;
@@ -50,7 +49,8 @@ impl SceneBuffers {
     /// that uses them.
     ///
     /// # Errors
-    /// [`GpuError::BufferTooLarge`] and [`GpuError::TooMany`], as [`RendererError::Gpu`];
+    /// [`BufferTooLarge`](crate::GpuError::BufferTooLarge) and
+    /// [`TooMany`](crate::GpuError::TooMany), as [`RendererError::Gpu`];
     /// [`RendererError::DeviceLost`] where the device gives no memory.
     pub fn new(device: &wgpu::Device, world: &World) -> Result<Self, RendererError> {
         let packed = PackedScene::new(world)?;
@@ -138,18 +138,6 @@ fn upload<T: Pod>(
     let copies = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
     let usage = wgpu::BufferUsages::STORAGE | copies;
     filled_buffer(device, what, usage, bytemuck::cast_slice(contents))
-}
-
-/// Refuses a storage buffer that the device cannot bind whole.
-pub(crate) fn fits(device: &wgpu::Device, what: &'static str, bytes: u64) -> Result<(), GpuError> {
-    let limits = device.limits();
-    let limit = limits
-        .max_storage_buffer_binding_size
-        .min(limits.max_buffer_size);
-    if bytes > limit {
-        return Err(GpuError::BufferTooLarge { what, bytes, limit });
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@ use bytemuck::{Pod, Zeroable};
 use caustics_scene::World;
 
 use crate::GpuError;
-use crate::error_scope::filled_buffer;
+use crate::buffers::filled_buffer;
 use crate::gpu_scene::PackedScene;
 use crate::pass_layout::{PassLayout, Slot};
 use crate::photon_order::dispatch;

@@ -1,14 +1,15 @@
-use crate::error_scope::filled_buffer;
-use crate::pass_layout::{PassLayout, Slot, part_of};
+use crate::pass_layout::{PassLayout, Slot};
 use crate::recorder::Recorder;
 use crate::renderer_error::RendererError;
 use crate::shader::{FOOTPRINT_RECORD, Shader, shader_piece};
 use crate::splat_options::{SplatMethod, SplatOptions};
 use crate::splat_quads::SplatQuads;
+use crate::splat_receivers::{ReceiverPasses, Receivers};
 use crate::splat_scratch::{FootprintBatch, GROUP, SplatScratch};
+use crate::splat_steps::SplatSteps;
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_tiles::SplatTiles;
-use crate::splat_view::{LEVELS, ROUNDS, SURROUNDING_TILE, SplatStep};
+use crate::splat_view::LEVELS;
 
 const PREPARE: Shader = Shader {
     label: "splat_prepare",
@@ -26,27 +27,6 @@ const PREPARE: Shader = Shader {
     ],
 };
 
-const TEXELS: Shader = Shader {
-    label: "splat_texels",
-    pieces: &[
-        shader_piece!("gate"),
-        shader_piece!("density"),
-        shader_piece!("splat_view"),
-        shader_piece!("splat_texels"),
-    ],
-};
-
-const COARSEN: Shader = Shader {
-    label: "splat_coarsen",
-    pieces: &[
-        shader_piece!("gate"),
-        shader_piece!("density"),
-        shader_piece!("splat_view"),
-        shader_piece!("screen"),
-        shader_piece!("splat_coarsen"),
-    ],
-};
-
 const UPSAMPLE: Shader = Shader {
     label: "splat_upsample",
     pieces: &[
@@ -58,83 +38,22 @@ const UPSAMPLE: Shader = Shader {
     ],
 };
 
-const SURROUNDINGS: Shader = Shader {
-    label: "splat_surroundings",
-    pieces: &[
-        shader_piece!("gate"),
-        shader_piece!("density"),
-        shader_piece!("splat_view"),
-        shader_piece!("surroundings"),
-        shader_piece!("splat_surroundings"),
-    ],
-};
-
-/// Bytes from one step's uniform to the next.
-const STEP_STRIDE: u64 = 256;
-
 /// The passes that turn footprints into a view's irradiance.
 #[derive(Clone, Debug)]
 pub(crate) struct Splat {
     options: SplatOptions,
     format: SumFormat,
-    texels: (PassLayout, wgpu::ComputePipeline),
-    coarsen: (PassLayout, wgpu::ComputePipeline),
-    surroundings: (PassLayout, [wgpu::ComputePipeline; 2]),
+    receivers: ReceiverPasses,
     prepare: (PassLayout, wgpu::ComputePipeline),
     upsample: (PassLayout, wgpu::ComputePipeline),
     way: Way,
     steps: SplatSteps,
-    nothing: wgpu::TextureView,
 }
 
 #[derive(Clone, Debug)]
 enum Way {
     Tiles(SplatTiles),
     Quads(SplatQuads),
-}
-
-/// The views of the host's that show what a view sees.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Receivers<'a> {
-    pub(crate) surface: &'a wgpu::TextureView,
-    pub(crate) normals: &'a wgpu::TextureView,
-    pub(crate) objects: Option<&'a wgpu::TextureView>,
-}
-
-/// The uniforms of all levels.
-#[derive(Clone, Debug)]
-pub(crate) struct SplatSteps(wgpu::Buffer);
-
-impl SplatSteps {
-    fn new(device: &wgpu::Device, layers: u32) -> Result<Self, RendererError> {
-        let mut bytes = vec![0; 2 * ROUNDS * LEVELS * STEP_STRIDE as usize];
-        for (index, place) in bytes.chunks_exact_mut(STEP_STRIDE as usize).enumerate() {
-            let step = SplatStep {
-                level: (index % LEVELS) as u32,
-                is_first: u32::from((index / LEVELS).is_multiple_of(2)),
-                layers,
-                round: (index / (2 * LEVELS)) as u32,
-            };
-            place[..size_of::<SplatStep>()].copy_from_slice(bytemuck::bytes_of(&step));
-        }
-        let usage = wgpu::BufferUsages::UNIFORM;
-        Ok(Self(filled_buffer(device, "splat steps", usage, &bytes)?))
-    }
-
-    pub(crate) fn at(&self, level: usize, is_first: bool) -> wgpu::BindingResource<'_> {
-        self.in_round(level, is_first, 0)
-    }
-
-    pub(crate) fn in_round(
-        &self,
-        level: usize,
-        is_first: bool,
-        round: usize,
-    ) -> wgpu::BindingResource<'_> {
-        let index = level + LEVELS * (2 * round + usize::from(!is_first));
-        let size = size_of::<SplatStep>() as u64;
-        part_of(&self.0, STEP_STRIDE * index as u64, size)
-    }
 }
 
 impl Splat {
@@ -145,31 +64,11 @@ impl Splat {
         let format = sum_format(device, options);
         let stages = wgpu::ShaderStages::COMPUTE;
         let kernel = [options.kernel.constant()];
-        let receivers = [
-            Slot::Store(wgpu::TextureFormat::Rgba32Uint),
-            Slot::Store(wgpu::TextureFormat::R32Uint),
-        ];
         let make = |shader: &Shader, slots: &[Slot]| {
             let layout = PassLayout::new(device, shader.label, stages, slots);
             let pipeline = layout.compute(device, shader, shader.label, &kernel);
             (layout, pipeline)
         };
-        let texels = [
-            Slot::Uniform,
-            Slot::Texture,
-            Slot::Texture,
-            Slot::UintTexture,
-            receivers[0],
-            receivers[1],
-        ];
-        let coarsen = [
-            Slot::Uniform,
-            Slot::Uniform,
-            Slot::UintTexture,
-            Slot::UintTexture,
-            receivers[0],
-            receivers[1],
-        ];
         let prepare = [
             Slot::Uniform,
             Slot::Read,
@@ -180,13 +79,6 @@ impl Splat {
             Slot::Write,
             Slot::Read,
         ];
-        let surroundings = [
-            Slot::Uniform,
-            Slot::UintTexture,
-            Slot::UintTexture,
-            Slot::Write,
-        ];
-        let surroundings = PassLayout::new(device, SURROUNDINGS.label, stages, &surroundings);
         let upsample = [
             Slot::Uniform,
             Slot::Uniform,
@@ -199,26 +91,10 @@ impl Splat {
             Slot::Store(wgpu::TextureFormat::Rgba32Float),
             Slot::Read,
         ];
-        let nothing = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("caustics nothing"),
-            size: wgpu::Extent3d::default(),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Uint,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
         Ok(Self {
             options: *options,
             format,
-            texels: make(&TEXELS, &texels),
-            coarsen: make(&COARSEN, &coarsen),
-            surroundings: {
-                let make = |entry| surroundings.compute(device, &SURROUNDINGS, entry, &kernel);
-                let both = ["splat_surroundings", "splat_surroundings_coarser"].map(make);
-                (surroundings, both)
-            },
+            receivers: ReceiverPasses::new(device, &kernel),
             prepare: make(&PREPARE, &prepare),
             upsample: make(&UPSAMPLE, &upsample),
             way: match options.method {
@@ -226,7 +102,6 @@ impl Splat {
                 SplatMethod::Quads => Way::Quads(SplatQuads::new(device, options, format)?),
             },
             steps: SplatSteps::new(device, format.layers)?,
-            nothing: nothing.create_view(&wgpu::TextureViewDescriptor::default()),
         })
     }
 
@@ -250,7 +125,8 @@ impl Splat {
         scratch: &SplatScratch,
         batches: &[FootprintBatch<'_>],
     ) -> Result<(), RendererError> {
-        self.record_receivers(device, recorder, view, receivers, targets);
+        self.receivers
+            .record(device, recorder, view, &self.steps, receivers, targets);
         recorder.encoder.clear_buffer(&targets.counts, 0, None);
         if matches!(self.way, Way::Tiles(_)) && batches.len() > 1 {
             targets.second_sum(device);
@@ -300,73 +176,6 @@ impl Splat {
             self.record_upsample(device, recorder, view, targets, sums);
         }
         Ok(())
-    }
-
-    fn record_receivers(
-        &self,
-        device: &wgpu::Device,
-        recorder: &mut Recorder<'_>,
-        view: &wgpu::Buffer,
-        receivers: &Receivers<'_>,
-        targets: &SplatTargets,
-    ) {
-        let (layout, pipeline) = &self.texels;
-        let group = layout.bind(
-            device,
-            &[
-                view.as_entire_binding(),
-                wgpu::BindingResource::TextureView(receivers.surface),
-                wgpu::BindingResource::TextureView(receivers.normals),
-                wgpu::BindingResource::TextureView(receivers.objects.unwrap_or(&self.nothing)),
-                wgpu::BindingResource::TextureView(&targets.texels[0]),
-                wgpu::BindingResource::TextureView(&targets.objects[0]),
-            ],
-        );
-        let mut pass = recorder.compute("splat_texels", LEVELS as u32);
-        let [width, height] = [targets.levels[0][0], targets.levels[0][1]];
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(width.div_ceil(16), height.div_ceil(16), 1);
-        let (layout, pipeline) = &self.coarsen;
-        pass.set_pipeline(pipeline);
-        for level in 1..LEVELS {
-            let group = layout.bind(
-                device,
-                &[
-                    view.as_entire_binding(),
-                    self.steps.at(level, true),
-                    wgpu::BindingResource::TextureView(&targets.texels[level - 1]),
-                    wgpu::BindingResource::TextureView(&targets.objects[level - 1]),
-                    wgpu::BindingResource::TextureView(&targets.texels[level]),
-                    wgpu::BindingResource::TextureView(&targets.objects[level]),
-                ],
-            );
-            let [width, height] = [targets.levels[level][0], targets.levels[level][1]];
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
-        }
-        drop(pass);
-        let (layout, [finest, coarser]) = &self.surroundings;
-        let group = layout.bind(
-            device,
-            &[
-                view.as_entire_binding(),
-                wgpu::BindingResource::TextureView(&targets.texels[0]),
-                wgpu::BindingResource::TextureView(&targets.objects[0]),
-                targets.surroundings.as_entire_binding(),
-            ],
-        );
-        let mut pass = recorder.compute("splat_surroundings", 2);
-        let [width, height] = [targets.levels[0][0], targets.levels[0][1]];
-        pass.set_bind_group(0, &group, &[]);
-        pass.set_pipeline(finest);
-        pass.dispatch_workgroups(
-            width.div_ceil(SURROUNDING_TILE),
-            height.div_ceil(SURROUNDING_TILE),
-            1,
-        );
-        pass.set_pipeline(coarser);
-        pass.dispatch_workgroups(1, 1, 1);
     }
 
     fn record_prepare(
@@ -464,11 +273,11 @@ mod tests {
     use crate::shader::{assert_layout, reflection};
     use crate::splat_scratch::{DENSITY_BYTES, PLACE_BYTES};
     use crate::splat_stats::SplatCounts;
-    use crate::splat_view::{SURROUNDING_BYTES, SplatView};
+    use crate::splat_view::{SURROUNDING_BYTES, SURROUNDING_TILE, SplatStep, SplatView};
 
     #[test]
     fn the_shaders_are_valid() {
-        for shader in [&PREPARE, &TEXELS, &COARSEN, &UPSAMPLE, &SURROUNDINGS] {
+        for shader in [&PREPARE, &UPSAMPLE] {
             let valid = reflection::validated(shader);
             assert!(valid.is_ok(), "{}", valid.unwrap_err());
         }

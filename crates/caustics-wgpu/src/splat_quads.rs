@@ -1,13 +1,13 @@
 use bytemuck::{Pod, Zeroable};
 
-use crate::error_scope::filled_buffer;
+use crate::buffers::filled_buffer;
 use crate::pass_layout::{PassLayout, Slot, part_of};
 use crate::recorder::Recorder;
 use crate::renderer_error::RendererError;
 use crate::shader::{Shader, shader_piece};
-use crate::splat::SplatSteps;
 use crate::splat_options::SplatOptions;
 use crate::splat_scratch::{FootprintBatch, GROUP, SPLATS_PER_FOOTPRINT, SplatScratch};
+use crate::splat_steps::SplatSteps;
 use crate::splat_targets::{SplatTargets, SumFormat};
 use crate::splat_view::LEVELS;
 

@@ -1,8 +1,8 @@
-use crate::error_scope::storage_buffer;
+use crate::buffers::{bound_buffer, largest_binding};
 use crate::renderer_error::RendererError;
 use crate::splat_options::SplatOptions;
 use crate::splat_view::LEVELS;
-use crate::{FootprintRecord, GpuError, PhotonBuffers};
+use crate::{FootprintRecord, PhotonBuffers};
 
 /// Bytes of a `StoredDensity` of `shaders/density.wgsl`.
 pub(crate) const DENSITY_BYTES: u64 = 80;
@@ -80,17 +80,9 @@ impl SplatScratch {
         pairs: u64,
         layers: u32,
     ) -> Result<Self, RendererError> {
-        let limits = device.limits();
-        let limit = limits
-            .max_storage_buffer_binding_size
-            .min(limits.max_buffer_size);
+        let limit = largest_binding(&device.limits());
         let sizes = SplatSizes::of(capacity, tiles, pairs.min(limit / 4), layers);
-        let make = |what: &'static str, bytes: u64, usage| {
-            if bytes > limit {
-                return Err(GpuError::BufferTooLarge { what, bytes, limit });
-            }
-            Ok(storage_buffer(device, what, bytes, usage))
-        };
+        let make = |what, bytes, usage| bound_buffer(device, what, bytes, usage);
         let none = wgpu::BufferUsages::empty();
         Ok(Self {
             capacity,

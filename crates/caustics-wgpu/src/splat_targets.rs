@@ -1,7 +1,6 @@
 use glam::UVec2;
 
-use crate::GpuError;
-use crate::error_scope::{filled_buffer, storage_buffer};
+use crate::buffers::{bound_buffer, filled_buffer, storage_buffer};
 use crate::renderer_error::RendererError;
 use crate::splat_stats::SplatStats;
 use crate::splat_view::{LEVELS, SURROUNDING_BYTES, SurroundingLevels, levels, padded};
@@ -165,11 +164,6 @@ impl SplatTargets {
         let (levels, tiles) = levels(size, device.limits().max_texture_dimension_2d)?;
         let tiles_shown = SurroundingLevels::of(size).tiles;
         let bytes = u64::from(tiles_shown) * SURROUNDING_BYTES;
-        let limit = device.limits().max_storage_buffer_binding_size;
-        if bytes > limit {
-            let what = "what the tiles of a view show";
-            return Err(GpuError::BufferTooLarge { what, bytes, limit }.into());
-        }
         let parts = ViewTextures::of(size, format);
         let single = |texture: &wgpu::Texture| -> Vec<_> {
             (0..texture.mip_level_count())
@@ -193,12 +187,12 @@ impl SplatTargets {
             estimate: parts.estimate.map(|it| SumTarget::of(&it.make(device))),
             totals,
             irradiance,
-            surroundings: storage_buffer(
+            surroundings: bound_buffer(
                 device,
-                "caustics surroundings",
+                "what the tiles of a view show",
                 bytes,
                 wgpu::BufferUsages::empty(),
-            ),
+            )?,
             counts: storage_buffer(
                 device,
                 "caustics counts",

@@ -3,12 +3,13 @@
 
 mod stage;
 
+use caustics_gpu_readback::{read_texture, uploaded_texture};
 use caustics_wgpu::glam::Mat4;
 use caustics_wgpu::{
     CausticsRenderer, CompositeTarget, FootprintBatch, FrameLight, FrameParams, RendererError,
     RendererOptions, SplatMethod, SplatOptions, SurfaceInput, ViewParams, camera_matrix, wgpu,
 };
-use stage::{Picture, Stage, TestError, device_with, read_texture, texture, upload};
+use stage::{Picture, Stage, TestError, device_with, upload};
 
 const TARGET: CompositeTarget = CompositeTarget::new(wgpu::TextureFormat::Rgba16Float);
 
@@ -281,7 +282,7 @@ fn depth_serves_as_well_as_positions() -> Result<(), TestError> {
                 .collect();
             let bytes = bytemuck::cast_slice(&depths);
             let format = wgpu::TextureFormat::R32Float;
-            let depth = texture(&device, &queue, picture.size, format, bytes);
+            let depth = uploaded_texture(&device, &queue, picture.size, format, bytes);
             (matrix, depth, background)
         });
     let draw = |view: ViewParams<'_>| -> Result<Vec<[f32; 4]>, TestError> {

@@ -2,12 +2,13 @@
 
 mod stage;
 
+use caustics_gpu_readback::{read_buffer, uploaded_buffer};
 use caustics_render::{FootprintGather, FootprintKernel, FootprintOptions};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
     FootprintBatch, Gather, GatherCounts, GatherOptions, GatherPoint, SplatKernel, wgpu,
 };
-use stage::{Stage, TestError, buffer, device_with, read_buffer, upload};
+use stage::{Stage, TestError, device_with, upload};
 
 #[test]
 fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
@@ -57,8 +58,8 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
                 ..GatherPoint::default()
             })
             .collect();
-        let points_buffer = buffer(&device, &queue, bytemuck::cast_slice(&points));
-        let found = buffer(&device, &queue, &vec![255; 16 * points.len()]);
+        let points_buffer = uploaded_buffer(&device, &queue, bytemuck::cast_slice(&points), 16);
+        let found = uploaded_buffer(&device, &queue, &vec![255; 16 * points.len()], 16);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let batch = FootprintBatch {
             records: &records,

@@ -23,6 +23,7 @@ use std::time::Instant;
 use caustics_gpu_examples::picture::{FrameNotes, offscreen, write_png};
 use caustics_gpu_examples::stage::Stage;
 use caustics_gpu_examples::{Failure, headless};
+use caustics_gpu_readback::read_texture;
 
 use arguments::Arguments;
 use orbit::Orbit;
@@ -88,7 +89,7 @@ fn without_window(mut arguments: Arguments) -> Result<(), Failure> {
         }
     }
     if let Some(path) = &arguments.screenshot {
-        let pixels = headless::read_texture(&device, &queue, &texture, 4)?;
+        let pixels = read_texture(&device, &queue, &texture, 4)?;
         write_png(path, size, &pixels)?;
         println!("wrote {}", path.display());
     }

@@ -4,6 +4,7 @@ use std::time::Instant;
 use caustics_gpu_examples::picture::{FrameNotes, PassMilliseconds, offscreen, write_png};
 use caustics_gpu_examples::stage::Stage;
 use caustics_gpu_examples::{Failure, headless};
+use caustics_gpu_readback::read_texture;
 use caustics_wgpu::{SplatKernel, SplatMethod, SplatStats};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -198,7 +199,7 @@ impl Viewer {
             engine.draw_text(queue, &mut encoder, &view, &self.lines);
         }
         queue.submit([encoder.finish()]);
-        let mut pixels = headless::read_texture(device, queue, &texture, 4)?;
+        let mut pixels = read_texture(device, queue, &texture, 4)?;
         if matches!(
             open.config.format,
             wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb
@@ -290,6 +291,8 @@ impl Viewer {
                 };
                 self.orbit.zoom(0.9f32.powf(lines));
             }
+            // A frame may take seconds on a software adapter: none after the last.
+            WindowEvent::RedrawRequested if event_loop.exiting() => {}
             WindowEvent::RedrawRequested => {
                 self.draw()?;
                 if self

@@ -11,31 +11,18 @@ mod searches;
 mod tables;
 mod traces;
 
-use std::fs;
 use std::process::ExitCode;
 
+use caustics_benches::command::exit_code;
 use caustics_benches::conditions::conditions;
-use caustics_benches::document::with_tables;
+use caustics_benches::document::rewrite;
 use caustics_benches::stage::Failure;
 
 use crate::arguments::{Arguments, USAGE};
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse(std::env::args().skip(1)) {
-        Ok(Some(arguments)) => run(&arguments),
-        Ok(None) => {
-            print!("{USAGE}");
-            Ok(())
-        }
-        Err(failure) => Err(failure),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("acceleration: {failure}");
-            ExitCode::from(2)
-        }
-    }
+    let options = Arguments::parse(std::env::args().skip(1));
+    exit_code("acceleration", USAGE, options, run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -59,9 +46,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         println!("{name}\n\n{table}");
     }
     if let Some(path) = &arguments.document {
-        let document =
-            fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        fs::write(path, with_tables(&document, &tables)?)?;
+        rewrite(path, &tables)?;
     }
     Ok(())
 }

@@ -4,8 +4,8 @@
 //! `cargo run --release -p caustics-benches --bin gpu_table -- --help` lists the options.
 
 mod chart;
-mod gpu;
 mod measure;
+mod receivers;
 mod rows;
 mod tables;
 
@@ -13,8 +13,9 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use caustics_benches::command::exit_code;
 use caustics_benches::conditions::conditions;
-use caustics_benches::document::with_tables;
+use caustics_benches::document::rewrite;
 use caustics_benches::stage::{Failure, SCENES, Stage};
 use caustics_benches::timing::Patience;
 
@@ -52,21 +53,8 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse(std::env::args().skip(1)) {
-        Ok(Some(arguments)) => run(&arguments),
-        Ok(None) => {
-            print!("{USAGE}");
-            Ok(())
-        }
-        Err(failure) => Err(failure),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("gpu_table: {failure}");
-            ExitCode::from(2)
-        }
-    }
+    let options = Arguments::parse(std::env::args().skip(1));
+    exit_code("gpu_table", USAGE, options, run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -85,13 +73,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     fs::write(&arguments.svg, chart::chart(&rows))?;
-    let document = fs::read_to_string(&arguments.document)
-        .map_err(|error| format!("{}: {error}", arguments.document.display()))?;
-    fs::write(
-        &arguments.document,
-        with_tables(&document, &tables::all(&rows))?,
-    )?;
-    Ok(())
+    rewrite(&arguments.document, &tables::all(&rows))
 }
 
 /// Takes over new rows, in place of old ones of the same scene and count.

@@ -4,16 +4,18 @@ use caustics::filter::{Comparison, Image};
 use caustics::render::{FootprintGather, FootprintOptions, GBuffer, splat};
 use caustics::trace::{PhotonMap, TraceOptions, trace_photons};
 use caustics_benches::flip::Flip;
+use caustics_benches::gpu::Gpu;
 use caustics_benches::score::Conditions;
 use caustics_benches::stage::{Failure, Stage};
 use caustics_benches::timing::{Patience, Timed, median_of};
+use caustics_gpu_readback::read_texture;
 use caustics_wgpu::{
     CausticsRenderer, FootprintBatch, FrameLight, FrameParams, Gather, GatherOptions, GatherPoint,
     PhotonBuffers, PhotonTracer, RendererOptions, SceneBuffers, SplatMethod, SplatOptions,
     SplatStats, TracePlan,
 };
 
-use crate::gpu::{Gpu, Receivers};
+use crate::receivers::Receivers;
 use crate::rows::{Row, Way};
 
 /// Photons of a batch: four landings of each fit a binding.
@@ -232,7 +234,7 @@ impl Bench {
             };
             gpu.run(|encoder| Ok(renderer.prepare(&gpu.device, &gpu.queue, encoder, &frame)?))
         };
-        let nothing = gpu.buffer(&[0u32; 4]);
+        let nothing = gpu.upload(&[]);
         let none = [FootprintBatch {
             records: &nothing,
             count: &nothing,
@@ -243,7 +245,9 @@ impl Bench {
         let frame = median_of(self.patience, || draw(&all))?;
         let seconds = frame.seconds;
         let frame = frame.value;
-        let irradiance = gpu.read_texture(frame.irradiance(0)?.texture())?;
+        let texture = frame.irradiance(0)?.texture();
+        let texels = read_texture(&gpu.device, &gpu.queue, texture, 16)?;
+        let irradiance: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&texels);
         let stats = SplatStats::from_bytes(&gpu.read(frame.stats(0)?, SplatStats::BYTES)?);
         let stats = stats.ok_or("no stats")?;
         if stats.dropped_pairs > 0 {
@@ -312,8 +316,8 @@ impl Bench {
         };
         let gather = Gather::new(&gpu.device, &options)?;
         let points = points(receivers);
-        let asked = gpu.buffer(&points);
-        let found = gpu.buffer(&vec![[0.0f32; 4]; points.len()]);
+        let asked = gpu.upload(bytemuck::cast_slice(&points));
+        let found = gpu.upload(&vec![0; 16 * points.len()]);
         let build = || gpu.run(|encoder| Ok(gather.build(&gpu.device, encoder, &batch)?));
         build()?;
         let built = median_of(self.patience, build)?;

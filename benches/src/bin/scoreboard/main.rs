@@ -13,8 +13,9 @@ mod tables;
 use std::fs;
 use std::process::ExitCode;
 
+use caustics_benches::command::exit_code;
 use caustics_benches::conditions::conditions;
-use caustics_benches::document::with_tables;
+use caustics_benches::document::rewrite;
 use caustics_benches::score::{Row, from_csv, peers_from_csv, to_csv};
 use caustics_benches::stage::{Failure, Stage};
 
@@ -22,21 +23,8 @@ use crate::arguments::{Arguments, USAGE};
 use crate::metric::Metric;
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse(std::env::args().skip(1)) {
-        Ok(Some(arguments)) => run(&arguments),
-        Ok(None) => {
-            print!("{USAGE}");
-            Ok(())
-        }
-        Err(failure) => Err(failure),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("scoreboard: {failure}");
-            ExitCode::from(2)
-        }
-    }
+    let options = Arguments::parse(std::env::args().skip(1));
+    exit_code("scoreboard", USAGE, options, run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -71,13 +59,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             chart::chart(&rows, &peers, metric),
         )?;
     }
-    let document = fs::read_to_string(&arguments.document)
-        .map_err(|error| format!("{}: {error}", arguments.document.display()))?;
     let mut all = tables::all(&rows, &peers);
     all.push(("full", full::table(&full)));
-    let written = with_tables(&document, &all)?;
-    fs::write(&arguments.document, written)?;
-    Ok(())
+    rewrite(&arguments.document, &all)
 }
 
 /// Takes over new rows, in place of old ones of the same cases.

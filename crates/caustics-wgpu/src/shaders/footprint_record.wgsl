@@ -12,3 +12,7 @@ struct FootprintRecord {
     normal: vec3<f32>,
     photon: u32,
 }
+
+fn flux_of(record: FootprintRecord) -> vec3<f32> {
+    return vec3<f32>(record.flux_r, record.flux_g, record.flux_b);
+}

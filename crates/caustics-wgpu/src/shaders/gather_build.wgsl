@@ -65,9 +65,8 @@ fn lacking(c: Covariance) -> f32 {
 fn density_of(record: FootprintRecord) -> Density {
     let c = covariance_of(record);
     let lack = max(lacking(c), 0.0);
-    let flux = vec3<f32>(record.flux_r, record.flux_g, record.flux_b);
     let widened = c + vec3<f32>(lack, 0.0, lack);
-    return density_spread(record.position, record.normal, record.incoming, flux, widened);
+    return density_spread(record.position, record.normal, record.incoming, flux_of(record), widened);
 }
 
 // The list of one of the eight corners of the box, unless an earlier one has the same.

@@ -37,10 +37,6 @@ fn landed(photon: u32, path: u32, is_along: bool) -> Landed {
     return result;
 }
 
-fn flux_of(record: FootprintRecord) -> vec3<f32> {
-    return vec3(record.flux_r, record.flux_g, record.flux_b);
-}
-
 fn book_silhouette(before: vec3<f32>, after: vec3<f32>) {
     if any(after > before) {
         book(LINE_SILHOUETTE_GAIN, after - before);

@@ -103,10 +103,6 @@ fn store(
     return max(max(d.strength.x, d.strength.y), d.strength.z) * kernel_peak();
 }
 
-fn flux_of(record: FootprintRecord) -> vec3<f32> {
-    return vec3<f32>(record.flux_r, record.flux_g, record.flux_b);
-}
-
 fn covariance_of(record: FootprintRecord) -> Covariance {
     let limit = view.max_anisotropy;
     return covariance_of_axes(record.axis_u, record.axis_v, record.normal, view.scale, limit);

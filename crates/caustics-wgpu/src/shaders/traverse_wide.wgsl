@@ -1,5 +1,5 @@
 // The closest hit of a ray in the hierarchy of four children a node, whose boxes are quantised after
-// Ylitie, Karras and Laine 2017. Twins: as of traverse.wgsl. `Hierarchy` in photon_tracer.rs says what
+// Ylitie, Karras and Laine 2017. Twins: as of traverse.wgsl. `Hierarchy` in tracer_shaders.rs says what
 // other forms cost.
 
 struct Children {

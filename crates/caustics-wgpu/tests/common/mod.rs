@@ -10,6 +10,7 @@ pub(crate) mod tracing;
 
 use std::sync::OnceLock;
 
+use caustics_gpu_readback::read_buffer;
 use caustics_wgpu::wgpu;
 
 /// A device of an adapter of this machine, with no more than WebGPU's default limits.
@@ -66,18 +67,6 @@ async fn device(
 
 /// The words of a buffer that may be copied from.
 pub(crate) fn words(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
-    let size = buffer.size();
-    let staging = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
-    queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
-    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-    let view = staging.get_mapped_range(..).unwrap();
-    bytemuck::cast_slice(&view).to_vec()
+    let bytes = read_buffer(device, queue, buffer, buffer.size()).unwrap();
+    bytemuck::pod_collect_to_vec(&bytes)
 }

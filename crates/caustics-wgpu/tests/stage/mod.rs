@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use caustics_filter::Image;
+use caustics_gpu_readback::{read_buffer, read_texture, uploaded_buffer, uploaded_texture};
 use caustics_render::{FootprintOptions, GBuffer, splat};
 use caustics_scene::{BvhOptions, Camera, SceneIntersector, Surface, World, gltf};
 use caustics_trace::{Photon, TraceOptions, trace_photons};
@@ -13,7 +14,7 @@ use caustics_wgpu::{
     SplatStats, SurfaceInput, ViewParams, camera_matrix, wgpu,
 };
 
-pub(crate) type TestError = Box<dyn std::error::Error>;
+pub(crate) type TestError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A device as a host makes it, with the required limits and these features; `None`, and a printed
 /// word, where the machine has no adapter for it.
@@ -186,7 +187,7 @@ impl Picture {
             .iter()
             .map(|it| it.map_or(0, |it| it.object))
             .collect();
-        let make = |format, bytes: &[u8]| texture(device, queue, self.size, format, bytes);
+        let make = |format, bytes: &[u8]| uploaded_texture(device, queue, self.size, format, bytes);
         PictureTextures {
             positions: make(wgpu::TextureFormat::Rgba32Float, &wide(|it| it.position)),
             normals: make(wgpu::TextureFormat::Rgba32Float, &wide(|it| it.normal)),
@@ -216,41 +217,6 @@ impl Picture {
     }
 }
 
-pub(crate) fn texture(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    [width, height]: [u32; 2],
-    format: wgpu::TextureFormat,
-    bytes: &[u8],
-) -> wgpu::TextureView {
-    let size = wgpu::Extent3d {
-        width,
-        height,
-        depth_or_array_layers: 1,
-    };
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    queue.write_texture(
-        texture.as_image_copy(),
-        bytes,
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(bytes.len() as u32 / height),
-            rows_per_image: None,
-        },
-        size,
-    );
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
 /// Photons as the GPU has them: records, and their count.
 pub(crate) fn upload(
     device: &wgpu::Device,
@@ -260,86 +226,9 @@ pub(crate) fn upload(
     let records: Vec<FootprintRecord> = photons.iter().map(FootprintRecord::from).collect();
     let count = [records.len() as u32];
     (
-        buffer(device, queue, bytemuck::cast_slice(&records)),
-        buffer(device, queue, bytemuck::cast_slice(&count)),
+        uploaded_buffer(device, queue, bytemuck::cast_slice(&records), 16),
+        uploaded_buffer(device, queue, bytemuck::cast_slice(&count), 16),
     )
-}
-
-pub(crate) fn buffer(device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) -> wgpu::Buffer {
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: bytes.len().max(16) as u64,
-        usage: wgpu::BufferUsages::STORAGE
-            | wgpu::BufferUsages::COPY_DST
-            | wgpu::BufferUsages::COPY_SRC,
-        mapped_at_creation: false,
-    });
-    queue.write_buffer(&buffer, 0, bytes);
-    buffer
-}
-
-/// The bytes of a buffer, once the GPU is done.
-pub(crate) fn read_buffer(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    source: &wgpu::Buffer,
-    bytes: u64,
-) -> Result<Vec<u8>, TestError> {
-    let target = reading(device, bytes);
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(source, 0, &target, 0, bytes);
-    queue.submit([encoder.finish()]);
-    finish_reading(device, &target)
-}
-
-fn reading(device: &wgpu::Device, bytes: u64) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("reading"),
-        size: bytes,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
-fn finish_reading(device: &wgpu::Device, target: &wgpu::Buffer) -> Result<Vec<u8>, TestError> {
-    let (sender, receiver) = std::sync::mpsc::channel();
-    target
-        .slice(..)
-        .map_async(wgpu::MapMode::Read, move |result| {
-            let _ = sender.send(result);
-        });
-    device.poll(wgpu::PollType::wait_indefinitely())?;
-    receiver.recv()??;
-    Ok(target.slice(..).get_mapped_range()?.to_vec())
-}
-
-/// The texels of a texture, `texel_bytes` each, row by row.
-pub(crate) fn read_texture(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    texture: &wgpu::Texture,
-    texel_bytes: u32,
-) -> Result<Vec<u8>, TestError> {
-    let row = texture.width() * texel_bytes;
-    let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let target = reading(device, u64::from(padded * texture.height()));
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &target,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(padded),
-                rows_per_image: None,
-            },
-        },
-        texture.size(),
-    );
-    queue.submit([encoder.finish()]);
-    let bytes = finish_reading(device, &target)?;
-    let rows = bytes.chunks_exact(padded as usize);
-    Ok(rows.flat_map(|it| &it[..row as usize]).copied().collect())
 }
 
 /// One view's irradiance, and what became of the footprints.
