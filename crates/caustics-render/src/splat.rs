@@ -14,7 +14,7 @@ use crate::splat_level::{Level, margin};
 use crate::surroundings::Surroundings;
 
 /// Photons that are prepared at a time, to bound the memory.
-const BATCH: usize = 1 << 17;
+const BATCH: usize = 1 << 14;
 
 /// Pixels a side of a level's pixel on the level below.
 pub(crate) const STRIDE: u32 = 2;

@@ -348,9 +348,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         point: &SurfacePoint,
         scattering: &Scattering,
     ) -> [Vec3; N] {
-        let is_passed = scattering
-            .outgoing()
-            .all(|it| it.event == Event::Passage);
+        let is_passed = scattering.outgoing().all(|it| it.event == Event::Passage);
         if N == 0 || is_passed {
             return [Vec3::ZERO; N];
         }
