@@ -487,15 +487,10 @@ impl BandTask<'_> {
         let to = (row - self.first_row) * self.width + columns.start;
         let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
         match self.reflection {
-            Reflection::Lambertian if relation != Relation::Mixed => {
-                self.columns.light(density, gate, from, count, light, to);
-            }
             Reflection::Lambertian => {
-                for (index, texel) in (to..).zip(&self.texels[from..from + count]) {
-                    if let Some(texel) = texel {
-                        light.add(index, splat.irradiance(texel));
-                    }
-                }
+                let is_mixed = relation == Relation::Mixed;
+                self.columns
+                    .light(density, gate, is_mixed, from, count, light, to);
             }
             Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
         }
