@@ -99,8 +99,10 @@ impl TexelColumns {
     ) {
         // One loop for each kernel, so that none asks in its midst which one it is.
         macro_rules! with {
-            ($kernel:expr) => {{
-                let kernel = |u, v| $kernel.density(u, v);
+            ($shape:expr) => {{
+                let mut known = density.lighting().kernel;
+                known.shape = $shape;
+                let kernel = |u, v| known.density(u, v);
                 if is_mixed {
                     let is_own = |object| object == density.object;
                     self.light_by(
@@ -120,7 +122,7 @@ impl TexelColumns {
                 }
             }};
         }
-        match density.lighting().kernel {
+        match density.lighting().kernel.shape {
             FootprintKernel::Gaussian => with!(FootprintKernel::Gaussian),
             FootprintKernel::Ellipse => with!(FootprintKernel::Ellipse),
             FootprintKernel::Disc => with!(FootprintKernel::Disc),

@@ -34,6 +34,12 @@ pub enum RenderError {
         /// The scale, in sample spacings.
         scale: f32,
     },
+    /// A Gaussian that ends too early, too late or nowhere.
+    #[error("the truncation {truncation} is not between 1 and 4 standard deviations")]
+    InvalidTruncation {
+        /// Where it ends, in standard deviations.
+        truncation: f32,
+    },
     /// A limit on anisotropy below that of a disc.
     #[error("the anisotropy limit {max_anisotropy} is not at least 1")]
     InvalidAnisotropy {

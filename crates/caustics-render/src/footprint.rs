@@ -1,9 +1,12 @@
+use std::ops::RangeInclusive;
+
 use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 
 use crate::covariance::Covariance;
 use crate::error::RenderError;
 use crate::footprint_kernel::FootprintKernel;
+use crate::truncated_kernel::TruncatedKernel;
 
 /// The least cosine between a photon's direction and its receiver at which other points of the
 /// receiver are still followed along that direction; below it they are followed along the normal.
@@ -30,6 +33,9 @@ const IN_PLANE: f32 = 1e-3;
 /// the footprint's.
 pub(crate) const MAX_SLIDE: f32 = 2.0;
 
+/// Where a Gaussian may end, in standard deviations.
+const TRUNCATIONS: RangeInclusive<f32> = 1.0..=4.0;
+
 /// How photons are spread over their footprints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootprintOptions {
@@ -37,6 +43,14 @@ pub struct FootprintOptions {
     pub kernel: FootprintKernel,
     /// Standard deviation of the kernel along a footprint's axis, in sample spacings; above 0.
     pub scale: f32,
+    /// Where the Gaussian kernel ends, in standard deviations: 1 to 4. What would lie beyond is
+    /// shared out over the rest, so that no flux is lost. Other kernels end where they must, and
+    /// footprints that are [integrated over pixels](Self::integrate_pixels) always at 3.
+    ///
+    /// A footprint covers fewer points if it ends sooner, but its edge then shows. On ten scenes
+    /// with 262,144 photons, 2.65 instead of 3 takes 0 to 9 % off a splat's time and adds 0 to 6 %
+    /// to the relMSE, 2.5 adds 0 to 12 %.
+    pub truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at
     /// least 1. Infinite keeps every footprint as its differential says.
     pub max_anisotropy: f32,
@@ -58,6 +72,7 @@ impl Default for FootprintOptions {
         Self {
             kernel: FootprintKernel::Gaussian,
             scale: 0.55,
+            truncation: 3.0,
             max_anisotropy: f32::INFINITY,
             max_overlaps: f32::INFINITY,
             integrate_pixels: true,
@@ -69,10 +84,15 @@ impl FootprintOptions {
     /// Checks every number.
     ///
     /// # Errors
-    /// A scale, an anisotropy or a number of overlaps out of range.
+    /// A scale, a truncation, an anisotropy or a number of overlaps out of range.
     pub fn validate(&self) -> Result<(), RenderError> {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             return Err(RenderError::InvalidScale { scale: self.scale });
+        }
+        if !TRUNCATIONS.contains(&self.truncation) {
+            return Err(RenderError::InvalidTruncation {
+                truncation: self.truncation,
+            });
         }
         if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
             return Err(RenderError::InvalidAnisotropy {
@@ -113,7 +133,7 @@ pub(crate) struct Density {
     /// Flux over area and incident cosine: times the kernel and a receiver's own incident cosine,
     /// its irradiance.
     strength: Vec3,
-    kernel: FootprintKernel,
+    kernel: TruncatedKernel,
     /// Index of its receiver among the world's objects.
     pub(crate) object: u32,
 }
@@ -125,12 +145,13 @@ impl Density {
         photon: &Photon,
         pixel: Option<[Vec3; 2]>,
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Option<Self> {
         let mut covariance = Covariance::of_axes(&photon.axes, photon.normal, options);
         if let Some(pixel) = pixel {
-            covariance.add_pixel(&pixel, photon.normal, options.kernel);
+            covariance.add_pixel(&pixel, photon.normal, kernel.shape);
         }
-        Self::spread(&Beam::of(photon), &covariance, options.kernel)
+        Self::spread(&Beam::of(photon), &covariance, kernel)
     }
 
     /// The density of a photon on what catches its light before its plane, blurred by a pixel whose
@@ -139,10 +160,11 @@ impl Density {
         photon: &Photon,
         pixel: [Vec3; 2],
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Option<Self> {
         let up = towards_light(photon.incoming, photon.normal);
         let slid = pixel.map(|edge| edge - edge.dot(photon.normal) * up);
-        Self::new(photon, Some(slid), options)
+        Self::new(photon, Some(slid), options, kernel)
     }
 
     /// The density of a photon without a pixel, with its standard deviations kept within bounds, and
@@ -151,6 +173,7 @@ impl Density {
         photon: &Photon,
         bounds: &ExtentBounds,
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Option<(Self, Adjustment)> {
         let longest = bounds.most / options.scale;
         let mut shortened = false;
@@ -167,7 +190,7 @@ impl Density {
         });
         let mut covariance = Covariance::of_axes(&axes, photon.normal, options);
         let widened = covariance.widen(bounds.least * bounds.least);
-        let density = Self::spread(&Beam::of(photon), &covariance, options.kernel)?;
+        let density = Self::spread(&Beam::of(photon), &covariance, kernel)?;
         Some((density, Adjustment { widened, shortened }))
     }
 
@@ -183,7 +206,7 @@ impl Density {
             xy: xx * xy,
             yy: xy * xy + yy * yy,
         };
-        covariance.add_pixel(pixel, self.normal, self.kernel);
+        covariance.add_pixel(pixel, self.normal, self.kernel.shape);
         let cosine = (-self.incoming.dot(self.normal)).max(MIN_INCIDENCE);
         let beam = Beam {
             center: self.center,
@@ -195,7 +218,7 @@ impl Density {
         Self::spread(&beam, &covariance, self.kernel)
     }
 
-    fn spread(beam: &Beam, covariance: &Covariance, kernel: FootprintKernel) -> Option<Self> {
+    fn spread(beam: &Beam, covariance: &Covariance, kernel: TruncatedKernel) -> Option<Self> {
         let Beam {
             center,
             normal,
@@ -311,7 +334,7 @@ impl Density {
         self.kernel.cut()
     }
 
-    /// See [`FootprintKernel::outer_reach`].
+    /// See [`TruncatedKernel::outer_reach`].
     pub(crate) fn outer_reach(&self) -> f32 {
         self.kernel.outer_reach()
     }
@@ -332,7 +355,7 @@ impl Density {
         let [a, b] = self.half_extents();
         let ellipse = a.length_squared() + b.length_squared();
         // A tent reaches into the corners of the parallelogram, an ellipse does not.
-        let corners = if self.kernel == FootprintKernel::Tent {
+        let corners = if self.kernel.shape == FootprintKernel::Tent {
             2.0 * a.dot(b).abs()
         } else {
             0.0
@@ -428,7 +451,7 @@ pub(crate) struct Lighting<'a> {
     pub(crate) u_gradient: &'a Vec3,
     pub(crate) v_gradient: &'a Vec3,
     pub(crate) strength: &'a Vec3,
-    pub(crate) kernel: FootprintKernel,
+    pub(crate) kernel: TruncatedKernel,
 }
 
 /// What a footprint spreads, and where.
@@ -488,7 +511,8 @@ mod tests {
                 events: 1,
                 source: caustics_trace::FootprintSource::Differential,
             };
-            let density = Density::new(&photon, None, &options).expect("it has an area");
+            let kernel = TruncatedKernel::of(&options);
+            let density = Density::new(&photon, None, &options, kernel).expect("it has an area");
             let radius = density.radius();
             let mut farthest = 0.0f32;
             for step in 0..200_000 {

@@ -6,9 +6,9 @@ use glam::Vec3;
 use crate::error::RenderError;
 use crate::eye::Receiver;
 use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
-use crate::footprint_kernel::FootprintKernel;
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
 use crate::thinning::thin_wide;
+use crate::truncated_kernel::TruncatedKernel;
 
 /// Footprints' spacings below this part of all are the close ones.
 const CLOSE_QUANTILE: f32 = 0.1;
@@ -108,7 +108,7 @@ pub struct FootprintGather {
     footprints: Vec<Footprint>,
     /// One for each footprint.
     densities: Vec<Density>,
-    kernel: FootprintKernel,
+    kernel: TruncatedKernel,
     /// By how much a search is widened, relative to a pixel's edges.
     blur_reach: f32,
     least_extent: f32,
@@ -141,6 +141,7 @@ impl FootprintGather {
             around.surface_area()
         };
         let extents = extent_bounds(&photons, options, diagonal);
+        let kernel = TruncatedKernel::of(options);
 
         let mut stats = GatherStats {
             merged: given - photons.len() as u64,
@@ -148,7 +149,7 @@ impl FootprintGather {
         };
         let mut densities = Vec::with_capacity(photons.len());
         let prepared = in_chunks(&photons, |_, photon| {
-            Density::within(photon, &extents, options)
+            Density::within(photon, &extents, options, kernel)
         });
         for one in prepared {
             let Some((density, Adjustment { widened, shortened })) = one else {
@@ -173,8 +174,8 @@ impl FootprintGather {
             pieces,
             footprints: densities.iter().map(Footprint::new).collect(),
             densities,
-            kernel: options.kernel,
-            blur_reach: options.kernel.search_reach() * options.kernel.pixel_variance().sqrt(),
+            kernel,
+            blur_reach: kernel.search_reach() * kernel.shape.pixel_variance().sqrt(),
             least_extent: extents.least,
             stats,
         })
@@ -443,6 +444,7 @@ fn extent_bounds(photons: &[Photon], options: &FootprintOptions, diagonal: f32) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::footprint_kernel::FootprintKernel;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -473,18 +475,21 @@ mod tests {
     #[test]
     fn the_middle_of_a_gaussian_has_its_flux_over_two_pi_times_its_variance() {
         let photons = [photon(Vec3::ONE, [0.2 * Vec3::X, 0.4 * Vec3::Z])];
-        let options = FootprintOptions {
-            scale: 0.5,
-            ..FootprintOptions::default()
-        };
-        let gather = FootprintGather::new(&photons, &options).unwrap();
-        // What is cut off at three standard deviations is shared out over the rest.
-        let kept = 1.0 - (-4.5f32).exp();
-        let peak = 1.0 / (2.0 * std::f32::consts::PI * 0.1 * 0.2 * kept);
-        let measured = gather.irradiance(Vec3::ONE, Vec3::Y);
-        for channel in 0..3 {
-            let expected = peak * photons[0].flux[channel];
-            assert_relative_eq!(measured[channel], expected, max_relative = 1e-5);
+        for truncation in [1.0f32, 2.5, 3.0, 4.0] {
+            let options = FootprintOptions {
+                scale: 0.5,
+                truncation,
+                ..FootprintOptions::default()
+            };
+            let gather = FootprintGather::new(&photons, &options).unwrap();
+            // What is cut off is shared out over the rest.
+            let kept = 1.0 - (-0.5 * truncation * truncation).exp();
+            let peak = 1.0 / (2.0 * std::f32::consts::PI * 0.1 * 0.2 * kept);
+            let measured = gather.irradiance(Vec3::ONE, Vec3::Y);
+            for channel in 0..3 {
+                let expected = peak * photons[0].flux[channel];
+                assert_relative_eq!(measured[channel], expected, max_relative = 1e-5);
+            }
         }
     }
 
@@ -620,8 +625,9 @@ mod tests {
         fn every_point_is_lit_by_the_sum_of_all_footprints(
             photons in prop::collection::vec(any_photon(), 1..60),
             kernel in prop::sample::select(&FootprintKernel::ALL[..]),
+            truncation in 1.0f32..=4.0,
         ) {
-            let options = FootprintOptions { kernel, ..FootprintOptions::default() };
+            let options = FootprintOptions { kernel, truncation, ..FootprintOptions::default() };
             let gather = FootprintGather::new(&photons, &options).unwrap();
             prop_assert_eq!(gather.len(), photons.len());
             let pixel = [0.05 * Vec3::X, Vec3::new(0.0, 0.02, 0.05)];

@@ -3,7 +3,7 @@ use glam::{Vec2, Vec3};
 
 use crate::eye::Receiver;
 use crate::footprint::{Density, Gate};
-use crate::footprint_kernel::FootprintKernel;
+use crate::truncated_kernel::TruncatedKernel;
 
 /// The most pieces that a layer is cut into.
 const MAX_PIECES: u32 = 256;
@@ -79,7 +79,7 @@ impl Footprint {
     /// The kernel at a point of a surface with unit `normal` if the point belongs to the piece and
     /// passes the gates; else 0.
     #[inline]
-    pub(crate) fn kernel_at(&self, piece: &Piece, target: &Target, kernel: FootprintKernel) -> f32 {
+    pub(crate) fn kernel_at(&self, piece: &Piece, target: &Target, kernel: TruncatedKernel) -> f32 {
         let Place {
             coordinates,
             height,

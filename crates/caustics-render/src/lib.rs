@@ -106,6 +106,7 @@ mod splat;
 mod splat_level;
 mod surroundings;
 mod thinning;
+mod truncated_kernel;
 
 pub use direct::DirectLight;
 pub use error::RenderError;

@@ -12,6 +12,7 @@ use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;
 use crate::splat_level::{Level, margin};
 use crate::surroundings::Surroundings;
+use crate::truncated_kernel::TruncatedKernel;
 
 /// Photons that are prepared at a time, to bound the memory.
 const BATCH: usize = 1 << 14;
@@ -76,9 +77,10 @@ pub fn splat(
         passes.push(Pass::new(Level::finest(buffer, true)));
     }
     let surroundings = Surroundings::of(buffer);
+    let kernel = TruncatedKernel::of(options);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
-        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options);
+        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options, kernel);
         for fate in &prepared {
             match fate {
                 Prepared::Splat(_) => stats.splatted += 1,
@@ -88,7 +90,13 @@ pub fn splat(
                 Prepared::Invalid => stats.invalid += 1,
             }
         }
-        prepared.extend(caught(batch, &buffer.screen, &surroundings, options));
+        prepared.extend(caught(
+            batch,
+            &buffer.screen,
+            &surroundings,
+            options,
+            kernel,
+        ));
         for pass in &mut passes {
             pass.accumulate(&prepared, &buffer.screen, &surroundings);
         }
@@ -202,6 +210,10 @@ impl PixelIntegral {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "most are splats, and a loop over them should not chase pointers"
+)]
 pub(crate) enum Prepared {
     Splat(Splat),
     Outside,
@@ -225,6 +237,7 @@ fn prepare(
     screen: &Screen,
     surroundings: &Surroundings,
     options: &FootprintOptions,
+    kernel: TruncatedKernel,
 ) -> Vec<Prepared> {
     #[cfg(feature = "parallel")]
     {
@@ -232,13 +245,13 @@ fn prepare(
         photons
             .par_iter()
             .with_min_len(1024)
-            .map(|photon| Splat::prepare(photon, screen, surroundings, options))
+            .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernel))
             .collect()
     }
     #[cfg(not(feature = "parallel"))]
     photons
         .iter()
-        .map(|photon| Splat::prepare(photon, screen, surroundings, options))
+        .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernel))
         .collect()
 }
 
@@ -248,9 +261,10 @@ fn caught(
     screen: &Screen,
     surroundings: &Surroundings,
     options: &FootprintOptions,
+    kernel: TruncatedKernel,
 ) -> Vec<Prepared> {
     let one = |photon: &Photon| {
-        Splat::before_plane(photon, screen, surroundings, options).map(Prepared::Splat)
+        Splat::before_plane(photon, screen, surroundings, options, kernel).map(Prepared::Splat)
     };
     #[cfg(feature = "parallel")]
     {
@@ -272,12 +286,13 @@ impl Splat {
         screen: &Screen,
         surroundings: &Surroundings,
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Option<Self> {
         if screen.facing_cosine(photon.position, photon.normal) >= LEAST_FACING {
             return None;
         }
         let pixel = screen.facing_axes(photon.position);
-        let density = Density::before_plane(photon, pixel, options)?;
+        let density = Density::before_plane(photon, pixel, options, kernel)?;
         let [_, gate] = density.gate().divided();
         let bounds = Bounds::of(&density, [gate.before, gate.reach], screen).clipped(screen)?;
         let in_reach = surroundings.in_reach(&density, &gate, bounds.low, bounds.high)?;
@@ -307,13 +322,14 @@ impl Splat {
         screen: &Screen,
         surroundings: &Surroundings,
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Prepared {
         let facing = screen.facing_cosine(photon.position, photon.normal);
         if facing <= 0.0 {
             return Prepared::TurnedAway;
         }
         let pixel = screen.pixel_axes(photon.position, photon.normal);
-        let Some(density) = Density::new(photon, pixel, options) else {
+        let Some(density) = Density::new(photon, pixel, options, kernel) else {
             return Prepared::Invalid;
         };
         let mut gate = density.gate();

@@ -4,6 +4,7 @@ use std::f32::consts::PI;
 use caustics_trace::Photon;
 
 use crate::footprint::FootprintOptions;
+use crate::truncated_kernel::TruncatedKernel;
 
 /// Photons from which the size of the scene is taken.
 const SAMPLES: usize = 8192;
@@ -31,7 +32,7 @@ pub(crate) fn thin_wide<'a>(
     if !(scene > 0.0 && budget.is_finite()) {
         return Cow::Borrowed(photons);
     }
-    let reach = options.scale * options.kernel.reach();
+    let reach = options.scale * TruncatedKernel::of(options).reach();
     let area = |photon: &Photon| {
         let [a, b] = photon.axes;
         let squared = a.length_squared() + b.length_squared();

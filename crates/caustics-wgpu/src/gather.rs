@@ -10,6 +10,7 @@ use crate::recorder::Recorder;
 use crate::renderer_error::RendererError;
 use crate::shader::{FOOTPRINT_RECORD, Shader, shader_piece};
 use crate::splat_scratch::{DENSITY_BYTES, FootprintBatch, GROUP};
+use crate::truncation;
 use crate::{FootprintRecord, GpuError};
 
 const BUILD: Shader = Shader {
@@ -51,8 +52,8 @@ const POINT_GROUP: u32 = 64;
 /// Lists for each footprint that there is room for.
 const LISTS_PER_FOOTPRINT: u32 = 2;
 
-/// The smallest cells' edge, relative to the least extent of a footprint: their boxes are no
-/// smaller than three standard deviations on each side.
+/// The smallest cells' edge, relative to the least extent of a footprint: the box around a Gaussian
+/// that ends at three standard deviations is no smaller.
 const CELL_OF_EXTENT: f32 = 6.0;
 
 /// Mirror of the struct of the same name in `shaders/gather_grid.wgsl`.
@@ -65,8 +66,7 @@ struct GatherGrid {
     max_anisotropy: f32,
     least_extent: f32,
     most_extent: f32,
-    points: u32,
-    pad: u32,
+    truncation: [f32; 2],
 }
 
 /// A point of a surface at which light is asked for, as the GPU's buffers hold it.
@@ -143,8 +143,7 @@ impl Gather {
             },
             least_extent: options.least_extent,
             most_extent: options.most_extent,
-            points: 0,
-            pad: 0,
+            truncation: truncation::uniform(options.truncation),
         };
         let stages = wgpu::ShaderStages::COMPUTE;
         let kernel = [options.kernel.constant()];
@@ -355,8 +354,7 @@ mod tests {
                 max_anisotropy,
                 least_extent,
                 most_extent,
-                points,
-                pad
+                truncation,
             }
         );
         let (module, _) = reflection::validated(&POINTS).unwrap();

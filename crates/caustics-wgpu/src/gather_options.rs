@@ -1,5 +1,6 @@
 use crate::renderer_error::RendererError;
 use crate::splat_options::SplatKernel;
+use crate::truncation;
 
 /// How a [`Gather`](crate::Gather) is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -8,6 +9,9 @@ pub struct GatherOptions {
     pub kernel: SplatKernel,
     /// Standard deviation of the kernel along a footprint's axis, in sample spacings; above 0.
     pub scale: f32,
+    /// Where the Gaussian kernel ends, in standard deviations: 1 to 4. What would lie beyond is
+    /// shared out over the rest, so that no flux is lost. Other kernels end where they must.
+    pub truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at least
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
@@ -30,6 +34,7 @@ impl Default for GatherOptions {
         Self {
             kernel: SplatKernel::default(),
             scale: 0.55,
+            truncation: 3.0,
             max_anisotropy: f32::INFINITY,
             least_extent: 1e-5,
             most_extent: 1e3,
@@ -53,6 +58,12 @@ impl GatherOptions {
                 self.scale,
                 is_positive(self.scale),
                 "above 0 and finite",
+            ),
+            (
+                "truncation",
+                self.truncation,
+                truncation::RANGE.contains(&self.truncation),
+                "1 to 4",
             ),
             (
                 "max_anisotropy",
@@ -102,6 +113,19 @@ mod tests {
     fn options_out_of_range_are_named() {
         let default = GatherOptions::default();
         assert_eq!(default.validate(), Ok(()));
+        let truncation = 4.5;
+        let error = GatherOptions {
+            truncation,
+            ..default
+        }
+        .validate()
+        .unwrap_err();
+        let expected = RendererError::OptionOutOfRange {
+            name: "truncation",
+            value: 4.5,
+            range: "1 to 4",
+        };
+        assert_eq!(error, expected);
         let most_extent = 1e9;
         let error = GatherOptions {
             most_extent,

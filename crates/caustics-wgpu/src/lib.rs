@@ -187,6 +187,7 @@ mod trace_dispatch;
 mod trace_params;
 mod trace_plan;
 mod tracer_shaders;
+mod truncation;
 mod view_params;
 mod wide_hierarchy;
 

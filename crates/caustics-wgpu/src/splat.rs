@@ -301,8 +301,7 @@ mod tests {
                 has_objects,
                 integrate_pixels,
                 surrounding_levels,
-                pad_a,
-                pad_b,
+                truncation,
                 levels,
                 surroundings,
             }

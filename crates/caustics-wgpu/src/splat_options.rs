@@ -1,4 +1,5 @@
 use crate::renderer_error::RendererError;
+use crate::truncation;
 
 /// How footprints become pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -17,7 +18,8 @@ pub enum SplatMethod {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum SplatKernel {
-    /// A Gaussian with the footprint's axes for its standard deviations, cut off at three of them.
+    /// A Gaussian with the footprint's axes for its standard deviations, cut off at
+    /// [`SplatOptions::truncation`] of them.
     #[default]
     Gaussian,
     /// Epanechnikov's parabola over the footprint's ellipse.
@@ -47,6 +49,10 @@ pub struct SplatOptions {
     pub kernel: SplatKernel,
     /// Standard deviation of the kernel along a footprint's axis, in sample spacings; above 0.
     pub scale: f32,
+    /// Where the Gaussian kernel ends, in standard deviations: 1 to 4. What would lie beyond is
+    /// shared out over the rest, so that no flux is lost. Other kernels end where they must, and
+    /// footprints that are [integrated over pixels](Self::integrate_pixels) always at 3.
+    pub truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at least
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
@@ -73,6 +79,7 @@ impl Default for SplatOptions {
             method: SplatMethod::default(),
             kernel: SplatKernel::default(),
             scale: 0.55,
+            truncation: 3.0,
             max_anisotropy: f32::INFINITY,
             integrate_pixels: true,
             pairs_per_footprint: 8,
@@ -94,6 +101,12 @@ impl SplatOptions {
                 self.scale,
                 self.scale > 0.0 && self.scale.is_finite(),
                 "above 0 and finite",
+            ),
+            (
+                "truncation",
+                self.truncation,
+                truncation::RANGE.contains(&self.truncation),
+                "1 to 4",
             ),
             (
                 "max_anisotropy",
@@ -156,6 +169,15 @@ mod tests {
             }),
             "scale"
         );
+        for truncation in [0.99, 4.01, f32::NAN, f32::INFINITY] {
+            assert_eq!(
+                refused(SplatOptions {
+                    truncation,
+                    ..default
+                }),
+                "truncation"
+            );
+        }
         let max_anisotropy = f32::NAN;
         assert_eq!(
             refused(SplatOptions {

@@ -42,8 +42,7 @@ pub(crate) struct SplatView {
     pub(crate) has_objects: u32,
     pub(crate) integrate_pixels: u32,
     pub(crate) surrounding_levels: u32,
-    pub(crate) pad_a: u32,
-    pub(crate) pad_b: u32,
+    pub(crate) truncation: [f32; 2],
     pub(crate) levels: [[u32; 4]; 8],
     pub(crate) surroundings: [[u32; 4]; SURROUNDING_LEVELS],
 }

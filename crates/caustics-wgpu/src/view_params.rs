@@ -3,6 +3,7 @@ use glam::{Mat4, UVec2};
 use crate::renderer_error::RendererError;
 use crate::splat_options::SplatOptions;
 use crate::splat_view::{SplatView, SurroundingLevels, inverse_and_eye, levels};
+use crate::truncation;
 
 /// What tells where the surface lies that a pixel sees.
 #[derive(Clone, Copy, Debug)]
@@ -108,8 +109,7 @@ impl<'a> ViewParams<'a> {
             has_objects: u32::from(self.objects.is_some()),
             integrate_pixels: u32::from(options.integrates_pixels()),
             surrounding_levels: surroundings.count,
-            pad_a: 0,
-            pad_b: 0,
+            truncation: truncation::uniform(options.truncation),
             levels,
             surroundings: surroundings.levels,
         })

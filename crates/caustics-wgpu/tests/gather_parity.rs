@@ -16,19 +16,23 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         return Ok(());
     };
     let kernels = SplatKernel::ALL.into_iter().zip(FootprintKernel::ALL);
+    let (gaussian, its_twin) = (SplatKernel::Gaussian, FootprintKernel::Gaussian);
     let cases = ["p03_cognac", "p07_pool", "p09_cornell"]
-        .map(|name| (name, SplatKernel::Gaussian, FootprintKernel::Gaussian))
+        .map(|name| (name, gaussian, its_twin, 3.0))
         .into_iter()
-        .chain(kernels.map(|(kernel, twin)| ("p01_sphere", kernel, twin)));
-    for (name, kernel, twin) in cases {
+        .chain(kernels.map(|(kernel, twin)| ("p01_sphere", kernel, twin, 3.0)))
+        .chain([1.5, 4.0].map(|truncation| ("p01_sphere", gaussian, its_twin, truncation)));
+    for (name, kernel, twin, truncation) in cases {
         let stage = Stage::load(name, 10_000)?;
         let options = FootprintOptions {
             kernel: twin,
+            truncation,
             ..FootprintOptions::default()
         };
         let expected = FootprintGather::new(&stage.photons, &options)?;
         let options = GatherOptions {
             kernel,
+            truncation,
             least_extent: expected.least_extent(),
             most_extent: 1e7 * expected.least_extent(),
             capacity: stage.photons.len() as u32,
@@ -96,7 +100,7 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             );
         }
         println!(
-            "{name} {kernel:?}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
+            "{name} {kernel:?} {truncation}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
         // A disc is constant up to its edge: rounding decides which side a point on it is.
@@ -105,7 +109,10 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         } else {
             1e-3
         };
-        assert!(off < tolerance * sum, "{name} {kernel:?}: {off} of {sum}");
+        assert!(
+            off < tolerance * sum,
+            "{name} {kernel:?} {truncation}: {off} of {sum}"
+        );
         assert!(f64::from(exact) > 0.99 * f64::from(lit), "{exact} of {lit}");
     }
     Ok(())

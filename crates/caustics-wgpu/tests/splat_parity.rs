@@ -189,6 +189,62 @@ fn every_kernel_draws_the_picture_of_the_cpu() -> Result<(), TestError> {
 }
 
 #[test]
+fn every_truncation_draws_the_picture_of_the_cpu() -> Result<(), TestError> {
+    // Footprints that are integrated over pixels always end at three standard deviations.
+    let tiles = SplatOptions {
+        integrate_pixels: false,
+        ..SplatOptions::default()
+    };
+    let quads = SplatOptions {
+        method: SplatMethod::Quads,
+        ..tiles
+    };
+    let read_at_middles = FootprintOptions {
+        integrate_pixels: false,
+        ..FootprintOptions::default()
+    };
+    for (features, splat) in [
+        (wgpu::Features::empty(), tiles),
+        (wgpu::Features::FLOAT32_BLENDABLE, quads),
+    ] {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        let stage = Stage::load("p03_cognac", 20_000)?;
+        let picture = stage.picture(&stage.camera, SIZE);
+        let default = stage.splat(&picture, &read_at_middles)?;
+        for truncation in [1.5, 2.65, 4.0] {
+            let options = FootprintOptions {
+                truncation,
+                ..read_at_middles
+            };
+            let expected = stage.splat(&picture, &options)?;
+            let splat = SplatOptions {
+                truncation,
+                ..splat
+            };
+            let options = with(splat);
+            let (found, _) = irradiance(&device, &queue, &options, &picture, &[&stage.photons])?;
+            let found = picture.radiance(&found);
+            let (off, wrong) = differences(&picture, &found, &expected);
+            let (from_default, _) = differences(&picture, &found, &default);
+            println!(
+                "{:?} {truncation}: off by {off:.2e}, {wrong:.2e} of the pixels, \
+                 from the default {from_default:.2e}",
+                splat.method
+            );
+            assert!(
+                off < OFF,
+                "{truncation}: off by {off}, {wrong} of the pixels"
+            );
+            // Control: the pictures can be told from the default's.
+            assert!(from_default > 2.0 * OFF, "{truncation}: {from_default}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
 fn batches_add_up() -> Result<(), TestError> {
     let stage = Stage::load("p01_sphere", 20_000)?;
     let picture = stage.picture(&stage.camera, SIZE);

@@ -1,5 +1,5 @@
 // A photon's footprint as a density over its receiver's tangent plane: covariance and kernel.
-// CPU twins: `footprint.rs`, `footprint_kernel.rs` and `covariance.rs` of caustics-render.
+// CPU twins: `footprint.rs`, `truncated_kernel.rs` and `covariance.rs` of caustics-render.
 
 // 0 Gaussian, 1 ellipse (Epanechnikov), 2 disc, 3 tent: as `FootprintKernel::ALL` has them.
 override FOOTPRINT_KERNEL: u32 = 0u;
@@ -10,7 +10,6 @@ const KERNEL_DISC: u32 = 2u;
 
 const MIN_INCIDENCE: f32 = 0.05;
 const MAX_SLIDE: f32 = 2.0;
-const GAUSSIAN_CUT: f32 = 9.0;
 // sqrt(6): the radius at which the ellipse and the tent have variance 1.
 const WIDE_REACH: f32 = 2.4494897;
 
@@ -54,6 +53,9 @@ struct StoredDensity {
 
 // A symmetric matrix in the tangent plane's basis: xx, xy, yy.
 alias Covariance = vec3<f32>;
+
+// Where a Gaussian ends, in standard deviations, and its value in its middle.
+alias Truncation = vec2<f32>;
 
 fn is_finite_number(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
@@ -102,9 +104,10 @@ fn stored_incoming(stored: StoredDensity) -> vec3<f32> {
     return from_octahedral(vec2<f32>(stored.incoming_x, stored.incoming_y));
 }
 
-fn kernel_cut() -> f32 {
+// Squared radius, in standard deviations, beyond which there is no light.
+fn kernel_cut(gaussian: Truncation) -> f32 {
     switch FOOTPRINT_KERNEL {
-        case 0u: { return GAUSSIAN_CUT; }
+        case 0u: { return gaussian.x * gaussian.x; }
         case 1u: { return 6.0; }
         case 2u: { return 4.0; }
         default: { return 12.0; }
@@ -112,17 +115,17 @@ fn kernel_cut() -> f32 {
 }
 
 // Extent along each axis, in standard deviations.
-fn kernel_reach() -> f32 {
+fn kernel_reach(gaussian: Truncation) -> f32 {
     switch FOOTPRINT_KERNEL {
-        case 0u: { return 3.0; }
+        case 0u: { return gaussian.x; }
         case 2u: { return 2.0; }
         default: { return WIDE_REACH; }
     }
 }
 
 // The farthest that light gets along any direction: the tent has corners beyond the ellipse.
-fn kernel_outer_reach() -> f32 {
-    return select(kernel_reach(), 3.4641016, FOOTPRINT_KERNEL > KERNEL_DISC);
+fn kernel_outer_reach(gaussian: Truncation) -> f32 {
+    return select(kernel_reach(gaussian), 3.4641016, FOOTPRINT_KERNEL > KERNEL_DISC);
 }
 
 fn kernel_pixel_variance() -> f32 {
@@ -130,9 +133,9 @@ fn kernel_pixel_variance() -> f32 {
 }
 
 // The kernel's value in its middle, its largest.
-fn kernel_peak() -> f32 {
+fn kernel_peak(gaussian: Truncation) -> f32 {
     switch FOOTPRINT_KERNEL {
-        case 0u: { return 0.1609428; }
+        case 0u: { return gaussian.y; }
         case 1u: { return 0.10610330; }
         case 2u: { return 0.07957747; }
         default: { return 0.16666667; }
@@ -140,7 +143,7 @@ fn kernel_peak() -> f32 {
 }
 
 // The kernel at coordinates in standard deviations; its integral is 1.
-fn kernel_density(u: f32, v: f32) -> f32 {
+fn kernel_density(u: f32, v: f32, gaussian: Truncation) -> f32 {
     let squared = u * u + v * v;
     switch FOOTPRINT_KERNEL {
         case 0u: {
@@ -150,7 +153,7 @@ fn kernel_density(u: f32, v: f32) -> f32 {
             let second = series * series;
             let fourth = second * second;
             let eighth = fourth * fourth;
-            return select(0.0, 0.1609428 * (eighth * eighth), squared < GAUSSIAN_CUT);
+            return select(0.0, gaussian.y * (eighth * eighth), squared < gaussian.x * gaussian.x);
         }
         case 1u: { return max(1.0 - squared / 6.0, 0.0) * 0.10610330; }
         case 2u: { return select(0.0, 0.07957747, squared < 4.0); }
@@ -237,14 +240,14 @@ fn density_spread(
 }
 
 // No point farther from the center than this belongs to the footprint.
-fn density_radius(d: Density) -> f32 {
-    let r = kernel_reach();
+fn density_radius(d: Density, gaussian: Truncation) -> f32 {
+    let r = kernel_reach(gaussian);
     return r * sqrt(dot(d.axis_u, d.axis_u) + dot(d.axis_v, d.axis_v));
 }
 
-fn density_reach(d: Density) -> f32 {
+fn density_reach(d: Density, gaussian: Truncation) -> f32 {
     let cosine = -dot(d.incoming, d.normal);
-    return density_radius(d) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
+    return density_radius(d, gaussian) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
 }
 
 // The way from a plane towards the light, one metre off the plane.
@@ -292,7 +295,9 @@ fn density_cosine(
 }
 
 // The kernel of a stored density at a point.
-fn density_kernel(stored: StoredDensity, position: vec3<f32>) -> f32 {
+fn density_kernel(stored: StoredDensity, position: vec3<f32>, gaussian: Truncation) -> f32 {
     let relative = position - stored.center;
-    return kernel_density(dot(relative, stored.u_gradient), dot(relative, stored.v_gradient));
+    let u = dot(relative, stored.u_gradient);
+    let v = dot(relative, stored.v_gradient);
+    return kernel_density(u, v, gaussian);
 }

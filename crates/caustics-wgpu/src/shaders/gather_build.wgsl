@@ -19,9 +19,9 @@ struct Cells {
 
 // The cells that the box around what a footprint may light touches.
 fn cells_of(d: Density) -> Cells {
-    let half = kernel_outer_reach() * sqrt(d.axis_u * d.axis_u + d.axis_v * d.axis_v);
+    let half = kernel_outer_reach(grid.truncation) * sqrt(d.axis_u * d.axis_u + d.axis_v * d.axis_v);
     let up = towards_light(d.incoming, d.normal);
-    let reach = density_reach(d);
+    let reach = density_reach(d, grid.truncation);
     let low = -PLANE_DISTANCE * reach * up;
     let high = reach * up;
     // A little more than all, so that no rounding leaves a gap.
@@ -103,7 +103,7 @@ fn gather_count(@builtin(global_invocation_id) id: vec3<u32>) {
     atomicAdd(&counts[2], u32(is_shortened(record)));
     let cells = cells_of(d);
     atomicOr(&counts[6], 1u << cells.size);
-    densities[id.x] = density_store(d, gate_of(density_reach(d)), record.object);
+    densities[id.x] = density_store(d, gate_of(density_reach(d, grid.truncation)), record.object);
     for (var corner = 0u; corner < 8u; corner++) {
         let list = list_of(cells, corner);
         if list != NO_FOOTPRINT {

@@ -21,9 +21,8 @@ struct GatherGrid {
     // Bounds of a footprint's standard deviation, in metres.
     least_extent: f32,
     most_extent: f32,
-    // How many points an evaluation has.
-    points: u32,
-    pad: u32,
+    // See `Truncation`.
+    truncation: vec2<f32>,
 }
 
 fn gather_cell(position: vec3<f32>, edge: f32) -> vec3<i32> {

@@ -39,7 +39,8 @@ fn caustics_irradiance_on(object: u32, position: vec3<f32>, normal: vec3<f32>) -
             let is_own = object == CAUSTICS_ANY_OBJECT || object == stored.object;
             let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
             if cosine > 0.0 {
-                sum += cosine * density_kernel(stored, position) * stored.strength;
+                let kernel = density_kernel(stored, position, caustics_grid.truncation);
+                sum += cosine * kernel * stored.strength;
             }
         }
     }

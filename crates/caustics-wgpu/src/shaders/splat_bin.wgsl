@@ -33,8 +33,9 @@ fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = places[id.x];
     let level = view.levels[place.level];
     let rows = tile_rows(place);
+    let cut = kernel_cut(view.truncation);
     for (var row = rows.x; row < rows.y; row++) {
-        let columns = tile_columns(place, row);
+        let columns = tile_columns(place, row, cut);
         for (var column = columns.x; column < columns.y; column++) {
             if may_light(id.x, place, vec2<u32>(column, row)) {
                 atomicAdd(&tile_cursors[level.w + row * level.z + column], 1u);
@@ -52,6 +53,7 @@ fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = places[id.x];
     let level = view.levels[place.level];
     let rows = tile_rows(place);
+    let cut = kernel_cut(view.truncation);
     let room = arrayLength(&pairs);
     let each = round_pairs(room, arrayLength(&places));
     // Where all tiles' lists end: most often they fit in one round.
@@ -63,7 +65,7 @@ fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     var made = 0u;
     var dropped = 0u;
     for (var row = rows.x; row < rows.y; row++) {
-        let columns = tile_columns(place, row);
+        let columns = tile_columns(place, row, cut);
         for (var column = columns.x; column < columns.y; column++) {
             let tile = level.w + row * level.z + column;
             let is_mine = round_of(tile_starts[tile], each) == step.round;

@@ -54,12 +54,13 @@ fn range_of(packed: u32) -> vec2<u32> {
 }
 
 // From where to where along x a footprint's ellipse reaches, relative to its middle, on a line y
-// pixels below the middle; the end before the start where it does not.
-fn ellipse_span(place: SplatPlace, y: f32) -> vec2<f32> {
+// pixels below the middle, if it ends at the squared radius `cut`, in standard deviations; the end
+// before the start where it does not.
+fn ellipse_span(place: SplatPlace, y: f32, cut: f32) -> vec2<f32> {
     let across = y * place.step_y;
     let a = dot(place.step_x, place.step_x);
     let b = dot(place.step_x, across);
-    let c = dot(across, across) - kernel_cut();
+    let c = dot(across, across) - cut;
     let discriminant = b * b - a * c;
     if discriminant <= 0.0 || a <= 0.0 {
         return vec2<f32>(1.0, -1.0);
@@ -79,7 +80,7 @@ fn tile_rows(place: SplatPlace) -> vec2<u32> {
 
 // The tiles of a row of tiles that the ellipse touches, with a pixel to spare on each side: a
 // pixel's receiver need not lie under its middle.
-fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
+fn tile_columns(place: SplatPlace, row: u32, cut: f32) -> vec2<u32> {
     var columns = range_of(place.columns);
     if place.shape == SHAPE_INTEGRAL {
         let low = f32(row * TILE);
@@ -96,8 +97,8 @@ fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
         let c = dot(place.step_y, place.step_y);
         let determinant = a * c - b * b;
         if determinant > 1e-12 * a * c {
-            let bottom = sqrt(kernel_cut() * a / determinant);
-            let right = sqrt(kernel_cut() * c / determinant);
+            let bottom = sqrt(cut * a / determinant);
+            let right = sqrt(cut * c / determinant);
             // How far below the middle the ellipse's rightmost point lies.
             let at_right = -b / c * right;
             let low = f32(row * TILE) - 0.5 - place.center.y;
@@ -108,8 +109,8 @@ fn tile_columns(place: SplatPlace, row: u32) -> vec2<u32> {
             let above = max(low, -0.9999 * bottom);
             let below = min(high, 0.9999 * bottom);
             let ends = vec2<f32>(
-                ellipse_span(place, clamp(-at_right, above, below)).x,
-                ellipse_span(place, clamp(at_right, above, below)).y,
+                ellipse_span(place, clamp(-at_right, above, below), cut).x,
+                ellipse_span(place, clamp(at_right, above, below), cut).y,
             ) + place.center.x;
             let most = vec2<f32>(columns);
             columns.x = u32(clamp(floor(ends.x - 1.5), most.x, most.y));

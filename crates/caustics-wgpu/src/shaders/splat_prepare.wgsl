@@ -40,7 +40,8 @@ fn least_sigma(step_x: vec2<f32>, step_y: vec2<f32>) -> f32 {
 // its flux.
 fn normalisation(place: SplatPlace) -> f32 {
     let area = abs(place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x);
-    let extent = vec2<f32>(length(place.step_y), length(place.step_x)) * (sqrt(kernel_cut()) / area);
+    let cut = kernel_cut(view.truncation);
+    let extent = vec2<f32>(length(place.step_y), length(place.step_x)) * (sqrt(cut) / area);
     if !(max(extent.x, extent.y) <= SUMMED_EXTENT) {
         return 1.0;
     }
@@ -48,13 +49,13 @@ fn normalisation(place: SplatPlace) -> f32 {
     let high = ceil(place.center + extent - 0.5);
     var sum = 0.0;
     for (var y = low.y; y <= high.y; y += 1.0) {
-        let span = ellipse_span(place, y + 0.5 - place.center.y);
+        let span = ellipse_span(place, y + 0.5 - place.center.y, cut);
         let first = max(floor(place.center.x + span.x - 0.5), low.x);
         let last = min(ceil(place.center.x + span.y - 0.5), high.x);
         for (var x = first; x <= last; x += 1.0) {
             let offset = vec2<f32>(x + 0.5, y + 0.5) - place.center;
             let at = offset.x * place.step_x + offset.y * place.step_y;
-            sum += kernel_density(at.x, at.y);
+            sum += kernel_density(at.x, at.y, view.truncation);
         }
     }
     sum *= area;
@@ -100,7 +101,7 @@ fn store(
     stored.flat = flat;
     densities[index] = stored;
     atomicAdd(&counts.by_level[place.level], 1u);
-    return max(max(d.strength.x, d.strength.y), d.strength.z) * kernel_peak();
+    return max(max(d.strength.x, d.strength.y), d.strength.z) * kernel_peak(view.truncation);
 }
 
 fn covariance_of(record: FootprintRecord) -> Covariance {
@@ -141,7 +142,7 @@ fn prepare_before_plane(record: FootprintRecord, count: u32) -> f32 {
     if !(d.is_valid && is_finite_vector(record.position)) {
         return 0.0;
     }
-    let gate = gate_before(gate_of(density_reach(d)));
+    let gate = gate_before(gate_of(density_reach(d, view.truncation)));
     var bounds = bounds_of(d, vec2<f32>(gate.before, gate.reach));
     if is_outside(bounds) {
         return 0.0;
@@ -200,7 +201,7 @@ fn is_integrated(
     (*place).step_x = vec2<f32>(g.long, g.slope);
     (*place).step_y = vec2<f32>(g.short, g.strips);
     // A pixel has at most all of the flux: as bright as the peak of this.
-    (*d).strength = strength / kernel_peak();
+    (*d).strength = strength / kernel_peak(view.truncation);
     return true;
 }
 
@@ -229,7 +230,7 @@ fn prepare(index: u32, count: u32) -> f32 {
         atomicAdd(&counts.invalid, 1u);
         return peak;
     }
-    var gate = gate_of(density_reach(d));
+    var gate = gate_of(density_reach(d, view.truncation));
     if facing < LEAST_FACING {
         gate = gate_own(gate);
     }

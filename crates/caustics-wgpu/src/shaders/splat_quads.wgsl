@@ -68,7 +68,7 @@ fn slanted(place: SplatPlace) -> Slanted {
     let determinant = place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x;
     if place.shape == SHAPE_ELLIPSE && determinant != 0.0 {
         // With a pixel to spare: a pixel's receiver need not lie under its middle.
-        let half = vec2<f32>(kernel_outer_reach()) + abs(place.step_x) + abs(place.step_y);
+        let half = vec2<f32>(kernel_outer_reach(view.truncation)) + abs(place.step_x) + abs(place.step_y);
         let u = vec2<f32>(place.step_y.y, -place.step_x.y) / determinant;
         let v = vec2<f32>(-place.step_y.x, place.step_x.x) / determinant;
         return Slanted(place.center, half.x * u, half.y * v);
@@ -139,9 +139,10 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
     let place = places[corner.index];
     var weight = cosine;
     if place.shape == SHAPE_INTEGRAL {
-        weight *= kernel_peak() * pixel_gaussian_weight(integral_of(place), floor(corner.position.xy));
+        let part = pixel_gaussian_weight(integral_of(place), floor(corner.position.xy));
+        weight *= kernel_peak(view.truncation) * part;
     } else {
-        weight *= density_kernel(stored, position);
+        weight *= density_kernel(stored, position, view.truncation);
     }
     let share = splat_scale.scale * weight * stored.strength;
     if QUADS_ROUNDING == 0u {

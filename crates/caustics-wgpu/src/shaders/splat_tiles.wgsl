@@ -65,7 +65,7 @@ fn row_span(
         ends = pixel_gaussian_span(integral_of(place), y, y + 1.0);
     } else if shape == SHAPE_ELLIPSE {
         // With a pixel to spare on each side: a pixel's receiver need not lie under its middle.
-        ends = ellipse_span(place, y + 0.5 - place.center.y)
+        ends = ellipse_span(place, y + 0.5 - place.center.y, kernel_cut(view.truncation))
             + (place.center.x + vec2<f32>(-0.5, 0.5));
     } else {
         return box.xy;
@@ -96,9 +96,10 @@ fn weight_at(
         return 0.0;
     }
     if place.shape == SHAPE_INTEGRAL {
-        return cosine * kernel_peak() * pixel_gaussian_weight(integral_of(place), vec2<f32>(pixel));
+        let part = pixel_gaussian_weight(integral_of(place), vec2<f32>(pixel));
+        return cosine * kernel_peak(view.truncation) * part;
     }
-    return cosine * density_kernel(stored, position);
+    return cosine * density_kernel(stored, position, view.truncation);
 }
 
 @compute @workgroup_size(256)
@@ -171,7 +172,7 @@ fn splat_tiles(
             atomicAdd(&part_sums[channel], parts[channel]);
         }
         workgroupBarrier();
-        let bound = kernel_peak() * largest / BOUND_PARTS * vec3<f32>(vec3<u32>(
+        let bound = kernel_peak(view.truncation) * largest / BOUND_PARTS * vec3<f32>(vec3<u32>(
             atomicLoad(&part_sums[0]),
             atomicLoad(&part_sums[1]),
             atomicLoad(&part_sums[2]),

@@ -80,7 +80,8 @@ fn relation(tile: SurroundingTile, is_border: bool, stored: StoredDensity) -> u3
         let u = surrounding_extent(tile, stored.u_gradient, stored.center);
         let v = surrounding_extent(tile, stored.v_gradient, stored.center);
         let off = max(vec2<f32>(abs(u.x) - u.y, abs(v.x) - v.y), vec2<f32>(0.0));
-        if dot(off, off) > kernel_outer_reach() * kernel_outer_reach() {
+        let reach = kernel_outer_reach(view.truncation);
+        if dot(off, off) > reach * reach {
             return RELATION_DARK;
         }
     }
