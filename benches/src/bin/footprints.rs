@@ -1,6 +1,6 @@
-//! Measures what each choice of a footprint is worth on the public scenes: the kernel's scale, the
-//! limit of its anisotropy, the kernel itself, the check against neighbours and the integral over
-//! pixels. Writes `docs/footprints.md` and `docs/footprints.svg`.
+//! Measures what each choice of a footprint is worth on the public scenes: the kernel's scale, where
+//! it ends, the limit of its anisotropy, the kernel itself, the check against neighbours and the
+//! integral over pixels. Writes `docs/footprints.md` and `docs/footprints.svg`.
 //!
 //! ```text
 //! cargo run --release -p caustics-benches --bin footprints [photons]
@@ -19,6 +19,7 @@ use caustics_benches::chart::{self, Line, Panel};
 use caustics_benches::stage::{Failure, SCENES, Stage};
 
 const SCALES: [f32; 8] = [0.3, 0.4, 0.5, 0.55, 0.6, 0.7, 0.85, 1.0];
+const TRUNCATIONS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 const ANISOTROPIES: [f32; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, f32::INFINITY];
 
 /// relMSE of all pixels and of all but the worst 1 %.
@@ -28,6 +29,7 @@ type Errors = [f64; 2];
 struct Measured {
     scene: &'static str,
     scales: Vec<Errors>,
+    truncations: Vec<Errors>,
     anisotropies: Vec<Errors>,
     kernels: Vec<Errors>,
     unchecked: Errors,
@@ -75,6 +77,10 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
         all.iter().map(|it| errors(&map.photons, it)).collect()
     };
     let scales = each(&SCALES.map(|scale| FootprintOptions { scale, ..default }))?;
+    let truncations = each(&TRUNCATIONS.map(|truncation| FootprintOptions {
+        truncation,
+        ..default
+    }))?;
     let anisotropies = each(&ANISOTROPIES.map(|max_anisotropy| FootprintOptions {
         max_anisotropy,
         ..default
@@ -92,6 +98,7 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
     Ok(Measured {
         scene,
         scales,
+        truncations,
         anisotropies,
         kernels,
         unchecked,
@@ -109,7 +116,7 @@ the reference and, after the stroke, that of all but the worst 1 % of pixels. Th
 geometric mean over the scenes of what a choice has times the error of the default, which is bold.
 Every number is the same on any machine.
 
-![error by scale and by anisotropy](footprints.svg)
+![error by scale, by truncation and by anisotropy](footprints.svg)
 "
     );
     let default = FootprintOptions::default();
@@ -135,6 +142,16 @@ Every number is the same on any machine.
         &SCALES.map(|it| name(it.to_string(), it == default.scale)),
         measured,
         |it| it.scales.clone(),
+        &of_default,
+    )?;
+    table(
+        &mut text,
+        "Truncation",
+        "`FootprintOptions::truncation`: where the Gaussian ends, in standard deviations. Sooner, its edge \
+         shows; later, it covers more pixels. Footprints that are integrated over pixels always end at 3.",
+        &TRUNCATIONS.map(|it| name(it.to_string(), it == default.truncation)),
+        measured,
+        |it| it.truncations.clone(),
         &of_default,
     )?;
     table(
@@ -231,6 +248,7 @@ fn panels(measured: &[Measured]) -> Vec<Panel> {
         }
     };
     let scales = SCALES.map(f64::from).to_vec();
+    let truncations = TRUNCATIONS.map(f64::from).to_vec();
     // The last has no limit.
     let limits = ANISOTROPIES.map(|it| f64::from(it.min(100.0))).to_vec();
     vec![
@@ -240,6 +258,13 @@ fn panels(measured: &[Measured]) -> Vec<Panel> {
             [false, true],
             scales,
             |it| &it.scales,
+        ),
+        panel(
+            "truncation",
+            "end in standard deviations",
+            [false, true],
+            truncations,
+            |it| &it.truncations,
         ),
         panel(
             "anisotropy",
