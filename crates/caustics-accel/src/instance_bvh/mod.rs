@@ -173,18 +173,6 @@ impl InstanceBvh {
         self.build()
     }
 
-    /// The closest hits of many rays, the same as those of one after the other.
-    ///
-    /// As [`TriangleBvh::closest_hits`]: worth it where rays that follow each other lie close
-    /// together. What they share is also the transforming of the triangles.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.dispatch.run(ClosestHits {
-            tree: self,
-            rays,
-            hits,
-        });
-    }
-
     /// The instances, in the order in which they were given.
     #[must_use]
     pub fn instances(&self) -> &[BvhInstance] {
@@ -296,6 +284,16 @@ impl Intersect for InstanceBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.dispatch.run(ClosestHit { tree: self, ray })
+    }
+
+    /// As that of [`TriangleBvh`]: worth it where rays that follow each other lie close together. What
+    /// they share is also the transforming of the triangles.
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.dispatch.run(ClosestHits {
+            tree: self,
+            rays,
+            hits,
+        });
     }
 
     #[inline]

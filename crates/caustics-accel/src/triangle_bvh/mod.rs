@@ -177,20 +177,6 @@ impl TriangleBvh {
             + self.blocks.capacity() * size_of::<Block>()
     }
 
-    /// The closest hits of many rays, the same as those of one after the other.
-    ///
-    /// Worth it where rays that follow each other lie close together, as those from a lattice over
-    /// a light do: in Morton order 64 at a time share their way through the tree, in rows sixteen.
-    /// Rays that do not keep together are traced one by one. The shorter of the two
-    /// slices says how many there are.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.dispatch.run(ClosestHits {
-            tree: self.tree(),
-            rays,
-            hits,
-        });
-    }
-
     pub(crate) fn tree(&self) -> Tree<'_> {
         Tree {
             nodes: &self.nodes,
@@ -247,6 +233,18 @@ impl Intersect for TriangleBvh {
             tree: self.tree(),
             ray,
         })
+    }
+
+    /// Worth it where rays that follow each other lie close together, as those from a lattice over
+    /// a light do: in Morton order 64 at a time share their way through the tree, in rows sixteen.
+    /// Rays that do not keep together are traced one by one. The shorter of the two
+    /// slices says how many there are.
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.dispatch.run(ClosestHits {
+            tree: self.tree(),
+            rays,
+            hits,
+        });
     }
 
     #[inline]
