@@ -17,7 +17,7 @@ const SMALL: usize = 1024;
 const LEVELS: usize = 32;
 
 /// Points by which cuts are compared, at most about twice as many.
-const SAMPLES: usize = 2048;
+const SAMPLES: usize = 512;
 
 /// Places along each axis between which points may be cut apart.
 const PLACES: usize = 32;
@@ -53,13 +53,14 @@ struct Shape {
 }
 
 impl Shape {
-    fn divide(&mut self, points: &mut [Point], level: usize) {
+    /// Returns the least and the greatest coordinates.
+    fn divide(&mut self, points: &mut [Point], level: usize) -> (Vec3A, Vec3A) {
         let count = points.len();
+        let (low, high) = bounds(points);
         if count <= BUCKET {
             self.sizes.push(count as u8);
-            return;
+            return (low, high);
         }
-        let (low, high) = bounds(points);
         let cut = (count > SMALL && level < LEVELS)
             .then(|| Cut::best(points, low, high))
             .flatten()
@@ -74,27 +75,28 @@ impl Shape {
             (axis, left_count)
         });
         let (left, right) = points.split_at_mut(left_count);
-        let largest = left.iter().map(|point| point.along(axis));
-        let largest = largest.fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
-        let smallest = right.iter().map(|point| point.along(axis));
-        let smallest = smallest.fold(f32::INFINITY, |a, b| if b < a { b } else { a });
         let (root, first) = (self.splits.len(), self.sizes.len());
         self.splits.push(Split::EMPTY);
+        let split = |left_buckets, left: (Vec3A, Vec3A), right: (Vec3A, Vec3A)| {
+            Split::new(axis, left_buckets, left.1[axis], right.0[axis])
+        };
         #[cfg(feature = "parallel")]
         if count > PARALLEL_POINTS {
             let mut behind = Self::default();
-            rayon::join(
+            let (left, right) = rayon::join(
                 || self.divide(left, level + 1),
                 || behind.divide(right, level + 1),
             );
-            self.splits[root] = Split::new(axis, self.sizes.len() - first, largest, smallest);
+            self.splits[root] = split(self.sizes.len() - first, left, right);
             self.splits.append(&mut behind.splits);
             self.sizes.append(&mut behind.sizes);
-            return;
+            return (low, high);
         }
-        self.divide(left, level + 1);
-        self.splits[root] = Split::new(axis, self.sizes.len() - first, largest, smallest);
-        self.divide(right, level + 1);
+        let left = self.divide(left, level + 1);
+        let left_buckets = self.sizes.len() - first;
+        let right = self.divide(right, level + 1);
+        self.splits[root] = split(left_buckets, left, right);
+        (low, high)
     }
 }
 
@@ -114,10 +116,17 @@ struct Places {
 }
 
 impl Places {
+    /// The coordinate in units of a place; NaN where the extent is too large or too small for an
+    /// `f32`.
+    #[inline(always)]
+    fn along(self, coordinate: f32) -> f32 {
+        (coordinate - self.low) * self.in_a_metre
+    }
+
+    /// The place, of NaN the first.
     #[inline(always)]
     fn place(self, coordinate: f32) -> usize {
-        // Where the extent is too large or too small for an f32, NaN, and so the first.
-        (((coordinate - self.low) * self.in_a_metre) as usize).min(PLACES - 1)
+        (self.along(coordinate) as usize).min(PLACES - 1)
     }
 }
 
@@ -169,11 +178,13 @@ impl Cut {
     /// Puts the points on the left first and returns how many they are.
     fn partition(&self, points: &mut [Point]) -> usize {
         let mut left = 0;
+        let limit = self.right as f32;
         for place in 0..points.len() {
-            let is_left = self.places.place(points[place].along(self.axis)) < self.right;
+            // NaN is on the left, as by its place.
+            let is_right = self.places.along(points[place].along(self.axis)) >= limit;
             // Swapped in any case: nobody foresees on which side a point is.
             points.swap(left, place);
-            left += usize::from(is_left);
+            left += usize::from(!is_right);
         }
         left
     }
