@@ -66,7 +66,7 @@ pub struct PhotonTreeOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PhotonSplits {
-    /// Into halves of full buckets, along the widest axis: the faster to build.
+    /// Into halves of full buckets, along the widest axis.
     #[default]
     Halves,
     /// Nodes of more than 1024 points by the voxel volume heuristic: where the volumes of both
@@ -75,8 +75,8 @@ pub enum PhotonSplits {
     /// would hold 50 of the node's points, in metres as they are. Smaller nodes into halves.
     ///
     /// Keeps floors from walls and crowds from voids, so that searches look at fewer buckets:
-    /// twice as fast where they have no radius, somewhat faster where they have one. A few
-    /// buckets are not full.
+    /// twice as fast where they have no radius, somewhat faster where they have one. Built as
+    /// fast, in 1 % more memory, since a few buckets are not full.
     VoxelVolume,
 }
 

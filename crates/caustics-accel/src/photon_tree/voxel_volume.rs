@@ -16,7 +16,7 @@ const SMALL: usize = 1024;
 /// Below so many levels points are halved, so that the stack of a search is deep enough for any.
 const LEVELS: usize = 32;
 
-/// Points by which cuts are compared, at most about twice as many.
+/// Points by which cuts are compared, at most half as many more.
 const SAMPLES: usize = 512;
 
 /// Places along each axis between which points may be cut apart.
