@@ -4,6 +4,7 @@ mod collapse;
 pub(crate) mod gather;
 pub(crate) mod layout;
 mod refit;
+pub(crate) mod stage;
 pub(crate) mod stream;
 pub(crate) mod traverse;
 
@@ -15,8 +16,8 @@ use rayon::prelude::*;
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
 use self::layout::{Child, Node};
-use self::stream::ClosestHits;
-use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
+use self::stage::{ClosestHit, ClosestHits, Occlusion};
+use self::traverse::{MAX_DEPTH, Tree};
 use crate::simd::Dispatch;
 use crate::triangles::{self, Block, can_be_hit, corners_of, validate};
 use crate::{AccelError, Instructions, Intersect};
@@ -185,7 +186,7 @@ impl TriangleBvh {
     /// slices says how many there are.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.dispatch.run(ClosestHits {
-            tree: self.tree(),
+            stage: self,
             rays,
             hits,
         });
@@ -243,17 +244,11 @@ impl TriangleBvh {
 impl Intersect for TriangleBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(ClosestHit {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(ClosestHit { stage: self, ray })
     }
 
     #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        self.dispatch.run(Occlusion {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(Occlusion { stage: self, ray })
     }
 }
