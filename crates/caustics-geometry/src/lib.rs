@@ -81,6 +81,7 @@
 
 mod aabb;
 mod barycentric;
+mod facet;
 mod frame;
 mod hit;
 mod mesh;
@@ -98,6 +99,7 @@ mod watertight;
 
 pub use aabb::Aabb;
 pub use barycentric::{BarycentricGradient, interpolate};
+pub use facet::Facet;
 pub use frame::Frame;
 pub use glam;
 pub use hit::Hit;

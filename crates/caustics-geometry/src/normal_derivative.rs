@@ -33,7 +33,17 @@ impl NormalGradient {
     /// weighted normals cancel.
     #[must_use]
     pub fn on_triangle(triangle: &Triangle, normals: [Vec3; 3], u: f32, v: f32) -> Option<Self> {
-        let gradient = BarycentricGradient::new(triangle)?;
+        Self::interpolated(&BarycentricGradient::new(triangle)?, normals, u, v)
+    }
+
+    /// The same, on a triangle whose barycentric weights change so.
+    #[inline]
+    pub(crate) fn interpolated(
+        gradient: &BarycentricGradient,
+        normals: [Vec3; 3],
+        u: f32,
+        v: f32,
+    ) -> Option<Self> {
         let sum = interpolate(normals, u, v);
         let length = sum.length();
         let normal = sum.try_normalize()?;
@@ -58,6 +68,7 @@ impl NormalGradient {
     }
 
     /// The change of the normal for a displacement in metres.
+    #[inline]
     #[must_use]
     pub fn along(&self, displacement: Vec3) -> Vec3 {
         self.derivative * displacement

@@ -1,6 +1,6 @@
 use glam::Vec3;
 
-use crate::{Ray, Sphere};
+use crate::{Ray, Sphere, Triangle};
 
 /// Half the distance from 1 to the next f32: the largest relative error of one rounding.
 const UNIT_ROUNDOFF: f32 = 0.5 * f32::EPSILON;
@@ -48,7 +48,13 @@ impl SpawnPoint {
     /// slivers, and never more than a thousandth of the longest edge.
     #[must_use]
     pub fn on_triangle(a: Vec3, b: Vec3, c: Vec3, u: f32, v: f32) -> Self {
-        let plane_error = plane_error(b - a, c - a);
+        Self::on_plane(&Triangle { a, b, c }, u, v, plane_error(b - a, c - a))
+    }
+
+    /// The same, with what rounding does to the plane.
+    #[inline]
+    pub(crate) fn on_plane(triangle: &Triangle, u: f32, v: f32, plane_error: f32) -> Self {
+        let Triangle { a, b, c } = *triangle;
         let (a, b, c) = ((1.0 - u - v) * a, u * b, v * c);
         Self {
             position: a + b + c,
@@ -123,7 +129,7 @@ impl SpawnPoint {
 /// one triangle in 10^5 again, and one in 300 of those whose longest edge is more than 10 times
 /// their height.
 #[inline]
-fn plane_error(ab: Vec3, ac: Vec3) -> f32 {
+pub(crate) fn plane_error(ab: Vec3, ac: Vec3) -> f32 {
     let longest_squared = ab
         .length_squared()
         .max(ac.length_squared())

@@ -56,11 +56,12 @@ impl ColumnsMut<'_> {
     }
 }
 
-/// Positions and normals of texels; a pixel without one has a zero normal and is never lit.
+/// Positions, normals and objects of texels; a pixel without one has a zero normal and is never lit.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TexelColumns {
     position: Columns,
     normal: Columns,
+    object: Vec<u32>,
 }
 
 impl TexelColumns {
@@ -68,22 +69,29 @@ impl TexelColumns {
         let mut columns = Self {
             position: Columns::zero(texels.len()),
             normal: Columns::zero(texels.len()),
+            object: vec![0; texels.len()],
         };
         for (index, texel) in texels.iter().enumerate() {
             if let Some(texel) = texel {
                 columns.position.set(index, texel.position);
                 columns.normal.set(index, texel.normal);
+                columns.object[index] = texel.object;
             }
         }
         columns
     }
 
     /// Adds a photon's light to the irradiance of `count` texels from `first` on; that of the
-    /// first is at `target`.
+    /// first is at `target`. Where they are not `mixed`, all that are in reach are the receiver's.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one loop over one row, used in one place"
+    )]
     pub(crate) fn light(
         &self,
         density: &Density,
         gate: &Gate,
+        is_mixed: bool,
         first: usize,
         count: usize,
         irradiance: &mut ColumnsMut<'_>,
@@ -91,11 +99,26 @@ impl TexelColumns {
     ) {
         // One loop for each kernel, so that none asks in its midst which one it is.
         macro_rules! with {
-            ($kernel:expr) => {
-                self.light_by(density, gate, first, count, irradiance, target, |u, v| {
-                    $kernel.density(u, v)
-                })
-            };
+            ($kernel:expr) => {{
+                let kernel = |u, v| $kernel.density(u, v);
+                if is_mixed {
+                    let is_own = |object| object == density.object;
+                    self.light_by(
+                        density, gate, first, count, irradiance, target, kernel, is_own,
+                    );
+                } else {
+                    self.light_by(
+                        density,
+                        gate,
+                        first,
+                        count,
+                        irradiance,
+                        target,
+                        kernel,
+                        |_| true,
+                    );
+                }
+            }};
         }
         match density.lighting().kernel {
             FootprintKernel::Gaussian => with!(FootprintKernel::Gaussian),
@@ -119,6 +142,7 @@ impl TexelColumns {
         irradiance: &mut ColumnsMut<'_>,
         target: usize,
         kernel: impl Fn(f32, f32) -> f32,
+        is_own: impl Fn(u32) -> bool,
     ) {
         let read = first..first + count;
         let write = target..target + count;
@@ -130,8 +154,9 @@ impl TexelColumns {
         let (nx, ny, nz) = (
             &self.normal.x[read.clone()],
             &self.normal.y[read.clone()],
-            &self.normal.z[read],
+            &self.normal.z[read.clone()],
         );
+        let object = &self.object[read];
         let red = &mut irradiance.x[write.clone()];
         let green = &mut irradiance.y[write.clone()];
         let blue = &mut irradiance.z[write];
@@ -149,9 +174,7 @@ impl TexelColumns {
             let off = dx * normal.x + dy * normal.y + dz * normal.z;
             let alike = nx[i] * normal.x + ny[i] * normal.y + nz[i] * normal.z;
             let cosine = -(nx[i] * incoming.x + ny[i] * incoming.y + nz[i] * incoming.z);
-            let is_before = (off >= gate.before) & (off <= gate.reach);
-            let is_beyond = (off >= -gate.plane_distance) & (alike >= gate.normal_cosine);
-            let is_lit = is_before | (is_beyond & (off < 0.0));
+            let is_lit = gate.admits_at(off, alike, is_own(object[i]));
             let weight = kernel(u, v) * cosine.max(0.0);
             let weight = if is_lit { weight } else { 0.0 };
             red[i] += strength.x * weight;

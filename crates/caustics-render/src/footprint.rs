@@ -412,16 +412,14 @@ impl Gate {
     /// cosine with the footprint's; on the footprint's own receiver, or on another object.
     #[inline]
     pub(crate) fn admits_at(&self, off: f32, normal_cosine: f32, is_own: bool) -> bool {
-        if !is_own && normal_cosine >= PARALLEL_COSINE {
-            let touching = TOUCHING * self.reach;
-            return off >= -touching.min(self.plane_distance) && off <= touching;
-        }
-        let lowest = if is_own && normal_cosine >= self.normal_cosine {
-            -self.plane_distance
-        } else {
-            self.before
-        };
-        off >= lowest && off <= self.reach
+        // Without branches, so that loops over many points use vector instructions.
+        let is_parallel = !is_own & (normal_cosine >= PARALLEL_COSINE);
+        let touching = TOUCHING * self.reach;
+        let is_touching = (off >= -touching.min(self.plane_distance)) & (off <= touching);
+        let is_before = (off >= self.before) & (off <= self.reach);
+        let curves_away = is_own & (normal_cosine >= self.normal_cosine);
+        let is_beyond = curves_away & (off >= -self.plane_distance) & (off <= self.reach);
+        (is_parallel & is_touching) | (!is_parallel & (is_before | is_beyond))
     }
 }
 

@@ -8,12 +8,19 @@ use crate::covariance::Covariance;
 /// Where the normal distribution ends, in standard deviations.
 const CUT: f32 = 3.0;
 
-/// Strips that a pixel is cut into across the footprint's longer extent: the least, and the most for
-/// short footprints.
-const STRIPS: [f32; 2] = [4.0, 32.0];
+/// Strips that a pixel is cut into across the footprint's longer extent, at most.
+const MOST_STRIPS: f32 = 32.0;
 
-/// The widest strip, in standard deviations along the longer extent.
+/// The widest strip, in standard deviations along the longer extent, where it matters at what place in
+/// the strip its flux has its mean.
 const WIDEST_STRIP: f32 = 0.75;
+
+/// By how much, in pixels, the middle of a footprint may slant along the shorter extent from one end of
+/// a strip to the other; or by one standard deviation, which is blurred by so little.
+const MOST_SLANT: f32 = 0.25;
+
+/// By how much it may be off, in pixels, and in standard deviations.
+const MOST_SHIFT: [f32; 2] = [0.02, 0.1];
 
 /// The least standard deviation, in pixels: a point for all that a picture can tell.
 const LEAST_SIGMA: f32 = 1e-3;
@@ -61,8 +68,13 @@ impl PixelGaussian {
         // What is left of the shorter variance in one place, and what the strip's own extent adds.
         let within = (short - slope * covariance.xy).max(0.0);
         let long = long.sqrt().max(LEAST_SIGMA);
-        let [mut strips, most] = STRIPS;
-        while strips * long * WIDEST_STRIP < 1.0 && strips < most {
+        let [deviation, lean] = [within.sqrt(), slope.abs()];
+        let most_slant = MOST_SLANT.max(deviation);
+        let is_level = lean * long <= MOST_SHIFT[0].max(MOST_SHIFT[1] * deviation);
+        let mut strips = 1.0;
+        while strips < MOST_STRIPS
+            && (lean > most_slant * strips || !is_level && strips * long * WIDEST_STRIP < 1.0)
+        {
             strips *= 2.0;
         }
         let strip = strips.recip().min(2.0 * CUT * long);
@@ -88,80 +100,122 @@ impl PixelGaussian {
         }
     }
 
-    /// Adds to `weights`, row after row of `columns`, the part of the flux that each pixel of
-    /// `columns` and `rows` gets. All pixels together get 1.
-    pub(crate) fn add_weights(
+    /// Calls `light` with the column, the row and the part of the flux of each pixel of `columns` and
+    /// `rows` that gets any, and once for each. All pixels together get 1. `weights` is memory to work
+    /// in, of zeros or empty, and left so.
+    pub(crate) fn light_pixels(
         &self,
         columns: &Range<usize>,
         rows: &Range<usize>,
-        weights: &mut [f32],
+        weights: &mut Vec<f32>,
+        mut light: impl FnMut(usize, usize, f32),
     ) {
-        let width = columns.len();
         let (along, across) = if self.is_wide {
             (columns, rows)
         } else {
             (rows, columns)
         };
+        if weights.len() < across.len() {
+            weights.resize(across.len(), 0.0);
+        }
+        let cumulative = Cumulative::table();
+        let [per_long, per_short] = [self.long, self.short].map(f32::recip);
+        let per_strip = self.strips.recip();
+        let reach = CUT * self.short;
+        // No place is negative, so that conversion to whole numbers rounds down.
         let first = (self.center.x - CUT * self.long).max(along.start as f32);
         let last = (self.center.x + CUT * self.long).min(along.end as f32);
         let mut low = first;
-        let mut below = cumulative((low - self.center.x) / self.long);
+        let mut below = cumulative.at((low - self.center.x) * per_long);
         while low < last {
-            let pixel = low.floor();
-            // The next multiple of a strip's width, exact in binary.
-            let high = (((low * self.strips).floor() + 1.0) / self.strips).min(last);
-            let above = cumulative((high - self.center.x) / self.long);
-            let mass = above - below;
-            // Where the strip's flux has its mean, to first order: the density slopes down outwards.
-            let strip = high - low;
-            let middle = 0.5 * (low + high) - self.center.x;
-            let slant = strip * strip / (12.0 * self.long * self.long);
-            let mean = middle * (1.0 - slant.min(1.0));
-            let middle = self.center.y + self.slope * mean;
-            let place = pixel as usize - along.start;
-            let reach = CUT * self.short;
-            let begin = ((middle - reach).floor().max(across.start as f32)) as usize;
-            let end = ((middle + reach).ceil().min(across.end as f32)).max(0.0) as usize;
-            let mut left = cumulative((begin as f32 - middle) / self.short);
-            for cell in begin..end {
-                let right = cumulative((cell as f32 + 1.0 - middle) / self.short);
-                let other = cell - across.start;
-                let index = if self.is_wide {
-                    other * width + place
-                } else {
-                    place * width + other
-                };
-                weights[index] += mass * (right - left);
-                left = right;
+            let pixel = low as i32;
+            let pixel_end = ((pixel + 1) as f32).min(last);
+            // From and to where the pixel's strips have light across.
+            let mut lit = across.len()..0;
+            while low < pixel_end {
+                // The next multiple of a strip's width, exact in binary.
+                let strip = (low * self.strips) as i32;
+                let high = ((strip + 1) as f32 * per_strip).min(last);
+                let above = cumulative.at((high - self.center.x) * per_long);
+                let mass = above - below;
+                // Where the strip's flux has its mean, to first order: the density slopes down
+                // outwards.
+                let strip = (high - low) * per_long;
+                let middle = 0.5 * (low + high) - self.center.x;
+                let mean = middle * (1.0 - (strip * strip * (1.0 / 12.0)).min(1.0));
+                let middle = self.center.y + self.slope * mean;
+                let begin = (middle - reach).max(across.start as f32) as i32;
+                let end = (middle + reach + 1.0).min(across.end as f32) as i32;
+                let cells = begin as usize - across.start
+                    ..(end.max(begin) as usize).min(across.end) - across.start;
+                let place = |cell: i32| (cell as f32 - middle) * per_short;
+                let mut left = cumulative.at(place(begin));
+                let mut cell = begin;
+                for weight in weights.get_mut(cells.clone()).unwrap_or_default() {
+                    cell += 1;
+                    let right = cumulative.at(place(cell));
+                    *weight += mass * (right - left);
+                    left = right;
+                }
+                lit = lit.start.min(cells.start)..lit.end.max(cells.end);
+                low = high;
+                below = above;
             }
-            low = high;
-            below = above;
+            let pixel = pixel as usize;
+            for (cell, weight) in
+                (across.start + lit.start..).zip(weights.get_mut(lit).unwrap_or_default())
+            {
+                if *weight > 0.0 {
+                    let (column, row) = if self.is_wide {
+                        (pixel, cell)
+                    } else {
+                        (cell, pixel)
+                    };
+                    light(column, row, *weight);
+                    *weight = 0.0;
+                }
+            }
         }
+    }
+
+    /// The part of the flux that one pixel gets.
+    pub(crate) fn weight(&self, column: usize, row: usize, weights: &mut Vec<f32>) -> f32 {
+        let mut found = 0.0;
+        let (columns, rows) = (column..column + 1, row..row + 1);
+        self.light_pixels(&columns, &rows, weights, |_, _, weight| found = weight);
+        found
     }
 }
 
 /// The cumulative distribution of the normal distribution cut off at [`CUT`], by linear
 /// interpolation in a table: right to 2e-5.
-#[inline]
-fn cumulative(deviations: f32) -> f32 {
-    static VALUES: LazyLock<[f32; TABLE + 2]> = LazyLock::new(|| {
-        // Simpson's rule between the table's places.
-        let step = 2.0 * f64::from(CUT) / TABLE as f64;
-        let density = |x: f64| (-0.5 * x * x).exp();
-        let mut sums = [0.0f64; TABLE + 2];
-        for index in 0..TABLE {
-            let low = -f64::from(CUT) + index as f64 * step;
-            let part = density(low) + 4.0 * density(low + 0.5 * step) + density(low + step);
-            sums[index + 1] = sums[index] + part;
-        }
-        sums[TABLE + 1] = sums[TABLE];
-        sums.map(|sum| (sum / sums[TABLE]) as f32)
-    });
-    let place = (deviations + CUT) * (TABLE as f32 / (2.0 * CUT));
-    let place = place.clamp(0.0, TABLE as f32);
-    let index = place as usize;
-    let values = &*VALUES;
-    values[index] + (place - index as f32) * (values[index + 1] - values[index])
+struct Cumulative([f32; TABLE + 2]);
+
+impl Cumulative {
+    fn table() -> &'static Self {
+        static VALUES: LazyLock<Cumulative> = LazyLock::new(|| {
+            // Simpson's rule between the table's places.
+            let step = 2.0 * f64::from(CUT) / TABLE as f64;
+            let density = |x: f64| (-0.5 * x * x).exp();
+            let mut sums = [0.0f64; TABLE + 2];
+            for index in 0..TABLE {
+                let low = -f64::from(CUT) + index as f64 * step;
+                let part = density(low) + 4.0 * density(low + 0.5 * step) + density(low + step);
+                sums[index + 1] = sums[index] + part;
+            }
+            sums[TABLE + 1] = sums[TABLE];
+            Cumulative(sums.map(|sum| (sum / sums[TABLE]) as f32))
+        });
+        &VALUES
+    }
+
+    #[inline]
+    fn at(&self, deviations: f32) -> f32 {
+        let place = (deviations + CUT) * (TABLE as f32 / (2.0 * CUT));
+        let place = place.clamp(0.0, TABLE as f32);
+        let index = place as usize;
+        self.0[index] + (place - index as f32) * (self.0[index + 1] - self.0[index])
+    }
 }
 
 #[cfg(test)]
@@ -193,8 +247,22 @@ mod tests {
 
     fn weights(center: Vec2, covariance: &Covariance, size: usize) -> Vec<f32> {
         let mut weights = vec![0.0; size * size];
-        PixelGaussian::new(center, covariance).add_weights(&(0..size), &(0..size), &mut weights);
+        add_weights(
+            &PixelGaussian::new(center, covariance),
+            size,
+            0..size,
+            &mut weights,
+        );
         weights
+    }
+
+    fn add_weights(gaussian: &PixelGaussian, size: usize, rows: Range<usize>, weights: &mut [f32]) {
+        let first = rows.start;
+        let mut scratch = Vec::new();
+        gaussian.light_pixels(&(0..size), &rows, &mut scratch, |column, row, weight| {
+            weights[(row - first) * size + column] += weight;
+        });
+        assert!(scratch.iter().all(|&it| it == 0.0));
     }
 
     fn turned(long: f32, short: f32, angle: f32) -> Covariance {
@@ -264,10 +332,14 @@ mod tests {
             let whole = weights(Vec2::new(x, y), &turned(long, short, angle), 10);
             let mut pieces = vec![0.0; 100];
             let (above, below) = pieces.split_at_mut(cut * 10);
-            gaussian.add_weights(&(0..10), &(0..cut), above);
-            gaussian.add_weights(&(0..10), &(cut..10), below);
+            add_weights(&gaussian, 10, 0..cut, above);
+            add_weights(&gaussian, 10, cut..10, below);
             for (piece, whole) in pieces.iter().zip(&whole) {
                 prop_assert!((piece - whole).abs() < 1e-6);
+            }
+            for (pixel, whole) in whole.iter().enumerate() {
+                let one = gaussian.weight(pixel % 10, pixel / 10, &mut Vec::new());
+                prop_assert!((one - whole).abs() < 1e-6);
             }
         }
     }

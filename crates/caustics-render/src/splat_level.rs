@@ -398,21 +398,16 @@ impl BandTask<'_> {
         if rows.is_empty() || columns.is_empty() {
             return;
         }
-        weights.clear();
-        weights.resize(rows.len() * columns.len(), 0.0);
-        integral.gaussian.add_weights(&columns, &rows, weights);
-        for (row, weights) in rows.clone().zip(weights.chunks(columns.len())) {
-            let start = row * self.width;
-            for (column, &weight) in columns.clone().zip(weights) {
-                if weight > 0.0
-                    && let Some(texel) = &self.texels[start + column]
-                {
-                    let target = (row - self.first_row) * self.width + column;
-                    self.light
-                        .add(target, splat.integrated(integral, texel, weight));
+        let (texels, light) = (self.texels, &mut self.light);
+        let (width, first) = (self.width, self.first_row);
+        integral
+            .gaussian
+            .light_pixels(&columns, &rows, weights, |column, row, weight| {
+                if let Some(texel) = &texels[row * width + column] {
+                    let target = (row - first) * width + column;
+                    light.add(target, splat.integrated(integral, texel, weight));
                 }
-            }
-        }
+            });
         let begin = |row: usize| {
             self.extras
                 .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
@@ -421,8 +416,10 @@ impl BandTask<'_> {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
             if columns.contains(&column) {
-                let place = (row - rows.start) * columns.len() + column - columns.start;
-                self.extra_light[index] += splat.integrated(integral, texel, weights[place]);
+                let weight = integral.gaussian.weight(column, row, weights);
+                if weight > 0.0 {
+                    self.extra_light[index] += splat.integrated(integral, texel, weight);
+                }
             }
         }
     }
@@ -490,15 +487,10 @@ impl BandTask<'_> {
         let to = (row - self.first_row) * self.width + columns.start;
         let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
         match self.reflection {
-            Reflection::Lambertian if relation != Relation::Mixed => {
-                self.columns.light(density, gate, from, count, light, to);
-            }
             Reflection::Lambertian => {
-                for (index, texel) in (to..).zip(&self.texels[from..from + count]) {
-                    if let Some(texel) = texel {
-                        light.add(index, splat.irradiance(texel));
-                    }
-                }
+                let is_mixed = relation == Relation::Mixed;
+                self.columns
+                    .light(density, gate, is_mixed, from, count, light, to);
             }
             Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
         }

@@ -37,14 +37,14 @@ impl World {
         let material = self.objects()[object as usize].material;
         let (spawn, geometric_normal, shading_normal) =
             if let Some(triangle) = self.triangle(hit.primitive) {
-                let geometric_normal = triangle.unit_normal()?;
+                let facet = self.facet(hit.primitive)?;
+                let geometric_normal = facet.normal;
                 let shading_normal = self
                     .interpolated_normal(hit.primitive, hit.u, hit.v)
                     .and_then(Vec3::try_normalize)
                     .map_or(geometric_normal, |normal| towards(normal, geometric_normal));
-                let Triangle { a, b, c } = triangle;
                 (
-                    SpawnPoint::on_triangle(a, b, c, hit.u, hit.v),
+                    facet.spawn_point(&triangle, hit.u, hit.v),
                     geometric_normal,
                     shading_normal,
                 )
@@ -89,8 +89,8 @@ impl World {
     fn triangle_normal_gradient(&self, point: &SurfacePoint) -> Option<NormalGradient> {
         let normals = self.triangle_normals(point.primitive)?;
         self.interpolated_normal(point.primitive, point.u, point.v)?;
-        let triangle = self.triangle(point.primitive)?;
-        NormalGradient::on_triangle(&triangle, normals, point.u, point.v)
+        self.facet(point.primitive)?
+            .normal_gradient(normals, point.u, point.v)
     }
 
     /// The triangle with this primitive number; `None` where the primitive is not a triangle.

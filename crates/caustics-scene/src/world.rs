@@ -6,7 +6,7 @@ use crate::environment::Environment;
 use crate::light::Light;
 use crate::material::Material;
 use crate::scene::{Instance, Scene, SceneError, Shape, place_sphere};
-use caustics_geometry::{Aabb, Sphere};
+use caustics_geometry::{Aabb, Facet, Sphere, Triangle};
 use glam::Vec3;
 use std::ops::Range;
 
@@ -48,6 +48,8 @@ pub struct World {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    /// For each triangle, what is the same at each of its points; `None` without area.
+    facets: Vec<Option<Facet>>,
     spheres: Vec<Sphere>,
     objects: Vec<Object>,
     /// For each primitive, its object.
@@ -80,6 +82,7 @@ impl World {
             world.add(scene, instance)?;
         }
         world.number_primitives();
+        world.facets = world.faceted()?;
         Ok(world)
     }
 
@@ -184,6 +187,23 @@ impl World {
             .collect();
     }
 
+    /// What is the same at each point of a triangle, for all of them.
+    fn faceted(&self) -> Result<Vec<Option<Facet>>, SceneError> {
+        let mut facets = Vec::new();
+        let count = self.triangles.len();
+        facets
+            .try_reserve_exact(count)
+            .map_err(|_| SceneError::TooMany {
+                what: "triangles",
+                count: count as u64,
+            })?;
+        facets.extend(self.triangles.iter().map(|corners| {
+            let [a, b, c] = corners.map(|vertex| self.positions[vertex as usize]);
+            Facet::new(&Triangle { a, b, c })
+        }));
+        Ok(facets)
+    }
+
     fn area_light(&self, index: usize) -> Option<AreaLight> {
         let object = &self.objects[index];
         let material = &self.materials[object.material as usize];
@@ -230,6 +250,14 @@ impl World {
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// What is the same at each point of a triangle; `None` where the primitive is no triangle or has
+    /// no area.
+    #[inline]
+    #[must_use]
+    pub fn facet(&self, primitive: u32) -> Option<&Facet> {
+        self.facets.get(primitive as usize)?.as_ref()
     }
 
     /// Exact spheres. The first has the primitive number that follows the last triangle's.

@@ -246,9 +246,12 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             Branching::SplitFirst => !branch.has_split,
             Branching::SplitAll => true,
         };
-        let branch = &Branch {
+        let event = &SpecularEvent {
+            branch,
+            point,
+            normal_change: self.normal_change(branch, point, scattering),
             has_split: branch.has_split || (both && splits),
-            ..*branch
+            threshold,
         };
         if both && !splits {
             // The Fresnel term is the same for all channels, so the choice leaves the flux as it is.
@@ -260,32 +263,32 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             });
             if let Some(outgoing) = chosen.or(scattering.outgoing().last()) {
                 let kept = outgoing.weight.x;
-                self.follow(branch, point, outgoing, branch.flux, kept, threshold, rng);
+                self.follow(event, outgoing, branch.flux, kept, rng);
             }
         } else {
             for outgoing in scattering.outgoing() {
                 let flux = branch.flux * outgoing.weight;
-                self.follow(branch, point, outgoing, flux, 1.0, threshold, rng);
+                self.follow(event, outgoing, flux, 1.0, rng);
             }
         }
     }
 
     /// Queues one outgoing direction, if roulette lets it live. `kept` is the part of such paths
     /// that were chosen to go on here.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "the state of one event, used in one place"
-    )]
     fn follow(
         &mut self,
-        branch: &Branch<N>,
-        point: &SurfacePoint,
+        event: &SpecularEvent<'_, N>,
         outgoing: &Outgoing,
         flux: Vec3,
         mut kept: f32,
-        threshold: f32,
         rng: &mut CounterRng,
     ) {
+        let SpecularEvent {
+            branch,
+            point,
+            threshold,
+            ..
+        } = *event;
         let strongest = flux.max_element();
         if strongest <= 0.0 {
             return;
@@ -303,10 +306,11 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         }
         // Where only a part of the paths goes on, those that do stand farther apart.
         // By roots, which round alike on every machine, as powers do not.
-        let root = kept.sqrt();
-        let differential = self
-            .scattered(branch, point, outgoing)
-            .scaled(1.0 / if N > 2 { root.sqrt() } else { root });
+        let mut differential = event.scattered(outgoing);
+        if kept < 1.0 {
+            let root = kept.sqrt();
+            differential = differential.scaled(1.0 / if N > 2 { root.sqrt() } else { root });
+        }
         let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
         self.ledger.bounded_differentials += u64::from(shortened);
         let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {
@@ -326,30 +330,52 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             media: outgoing.media,
             depth: branch.depth,
             events: branch.events + u32::from(outgoing.event != Event::Passage),
-            has_split: branch.has_split,
+            has_split: event.has_split,
             channel: branch.channel,
             path: extended(branch.path, point.object, 1 + outgoing.event as u32),
             source,
         });
     }
 
-    fn scattered(
+    /// How the normal turns from a photon to its neighbours.
+    ///
+    /// It does as the interpolated one also where the geometric normal stood in, just inside a
+    /// silhouette: most neighbours have the interpolated one. A flat facet's footprint would stay as
+    /// narrow as the beam that met it, and burn a spot.
+    fn normal_change(
         &self,
         branch: &Branch<N>,
         point: &SurfacePoint,
-        outgoing: &Outgoing,
-    ) -> RayDifferential<N> {
-        let before = &branch.differential;
-        if N == 0 {
-            return *before;
+        scattering: &Scattering,
+    ) -> [Vec3; N] {
+        let is_passed = scattering.outgoing().all(|it| it.event == Event::Passage);
+        if N == 0 || is_passed {
+            return [Vec3::ZERO; N];
         }
-        let direction = branch.ray.direction;
         let side = if point.from_outside { 1.0 } else { -1.0 };
         let gradient = self.world.normal_gradient(point);
-        // Also where the geometric normal stood in, just inside a silhouette: most neighbours have
-        // the interpolated one, and turn as it does. A flat facet's footprint would stay as narrow
-        // as the beam that met it, and burn a spot.
-        let normal_change = before.position.map(|moved| side * gradient.along(moved));
+        let moved = branch.differential.position;
+        moved.map(|moved| side * gradient.along(moved))
+    }
+}
+
+/// A branch at a specular surface.
+struct SpecularEvent<'a, const N: usize> {
+    branch: &'a Branch<N>,
+    point: &'a SurfacePoint,
+    /// What a step along each parameter turns the normal by.
+    normal_change: [Vec3; N],
+    has_split: bool,
+    /// Flux below which roulette is played.
+    threshold: f32,
+}
+
+impl<const N: usize> SpecularEvent<'_, N> {
+    /// The differential of what leaves in one direction.
+    fn scattered(&self, outgoing: &Outgoing) -> RayDifferential<N> {
+        let before = &self.branch.differential;
+        let direction = self.branch.ray.direction;
+        let normal_change = self.normal_change;
         match outgoing.event {
             Event::Passage => *before,
             Event::Reflection => before.reflected(direction, outgoing.normal, normal_change),
