@@ -8,11 +8,10 @@ use caustics_geometry::glam::Affine3A;
 use caustics_geometry::{Aabb, Hit, Ray};
 
 use self::placement::Placement;
-use self::stream::ClosestHits;
-use self::traverse::{ClosestHit, Occlusion};
 use crate::box_tree::{BoxTree, Member};
 use crate::simd::Dispatch;
 use crate::triangle_bvh::layout::{Child, Node};
+use crate::triangle_bvh::stage::{ClosestHit, ClosestHits, Occlusion};
 use crate::triangles::MAX_COORDINATE;
 use crate::{AccelError, Instructions, Intersect, TriangleBvh};
 
@@ -283,14 +282,14 @@ fn invalid(instance: usize) -> AccelError {
 impl Intersect for InstanceBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(ClosestHit { tree: self, ray })
+        self.dispatch.run(ClosestHit { stage: self, ray })
     }
 
     /// As that of [`TriangleBvh`]: worth it where rays that follow each other lie close together. What
     /// they share is also the transforming of the triangles.
     fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.dispatch.run(ClosestHits {
-            tree: self,
+            stage: self,
             rays,
             hits,
         });
@@ -298,6 +297,6 @@ impl Intersect for InstanceBvh {
 
     #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        self.dispatch.run(Occlusion { tree: self, ray })
+        self.dispatch.run(Occlusion { stage: self, ray })
     }
 }

@@ -4,6 +4,7 @@ mod collapse;
 pub(crate) mod gather;
 pub(crate) mod layout;
 mod refit;
+pub(crate) mod stage;
 pub(crate) mod stream;
 pub(crate) mod traverse;
 
@@ -15,8 +16,8 @@ use rayon::prelude::*;
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
 use self::layout::{Child, Node};
-use self::stream::ClosestHits;
-use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
+use self::stage::{ClosestHit, ClosestHits, Occlusion};
+use self::traverse::{MAX_DEPTH, Tree};
 use crate::simd::Dispatch;
 use crate::triangles::{self, Block, can_be_hit, corners_of, validate};
 use crate::{AccelError, Instructions, Intersect};
@@ -229,10 +230,7 @@ impl TriangleBvh {
 impl Intersect for TriangleBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(ClosestHit {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(ClosestHit { stage: self, ray })
     }
 
     /// Worth it where rays that follow each other lie close together, as those from a lattice over
@@ -241,7 +239,7 @@ impl Intersect for TriangleBvh {
     /// slices says how many there are.
     fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.dispatch.run(ClosestHits {
-            tree: self.tree(),
+            stage: self,
             rays,
             hits,
         });
@@ -249,9 +247,6 @@ impl Intersect for TriangleBvh {
 
     #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        self.dispatch.run(Occlusion {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(Occlusion { stage: self, ray })
     }
 }
