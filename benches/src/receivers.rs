@@ -3,6 +3,7 @@
 use caustics::accel::Intersect;
 use caustics::filter::{Image, ImageError};
 use caustics::scene::Brdf;
+use caustics::trace::Photon;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -27,6 +28,24 @@ pub struct Receiver {
     /// Reflectance for each channel, times the part of the pixel that the sample stands for.
     pub albedo: Vec3,
     object: u32,
+}
+
+/// Normals of photons and receivers that are taken for one face's, as `NearestEstimate` has it.
+const MIN_NORMAL_COSINE: f32 = 0.7;
+
+/// How far off the tangent plane a photon may lie, relative to the reach, as `NearestEstimate` has
+/// it.
+const MAX_PLANE_DISTANCE: f32 = 0.2;
+
+impl Receiver {
+    /// Whether a photon counts in a search within `reach` metres, as `NearestEstimate` has it.
+    #[inline]
+    #[must_use]
+    pub fn accepts(&self, photon: &Photon, reach: f32) -> bool {
+        photon.normal.dot(self.normal) > MIN_NORMAL_COSINE
+            && photon.incoming.dot(self.normal) < 0.0
+            && (photon.position - self.position).dot(self.normal).abs() < MAX_PLANE_DISTANCE * reach
+    }
 }
 
 /// The receivers of a picture of `width` x `height` pixels: one at each pixel's middle, four in a

@@ -81,8 +81,8 @@
 //! Collapse to eight children: Ylitie, Karras and Laine 2017. Kd-tree over triangles: built after
 //! Wald and Havran 2006; traversed with a short stack (Horn et al. 2007) or restarts (Foley and
 //! Sugerman 2005), guided by a trail of bits (Laine 2010). Photon trees: Jensen, *Realistic
-//! Image Synthesis Using Photon Mapping* (2001); Wald 2022 on the left-balanced layout. Hash grid:
-//! Teschner et al. 2003.
+//! Image Synthesis Using Photon Mapping* (2001); Wald 2022 on the left-balanced layout; splits by
+//! voxel volumes after Wald, Günther and Slusallek 2004. Hash grid: Teschner et al. 2003.
 
 mod box_tree;
 mod error;
@@ -104,7 +104,7 @@ pub use instance_bvh::{BvhInstance, InstanceBvh};
 pub use intersect::Intersect;
 pub use left_balanced_tree::LeftBalancedTree;
 pub use neighbour::{NearestScratch, Neighbour};
-pub use photon_tree::PhotonTree;
+pub use photon_tree::{PhotonSplits, PhotonTree, PhotonTreeOptions};
 pub use simd::Instructions;
 pub use triangle_bvh::{BvhOptions, BvhPreset, TriangleBvh};
 pub use triangle_kd_tree::{

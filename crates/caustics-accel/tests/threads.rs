@@ -3,7 +3,8 @@
 mod common;
 
 use caustics_accel::{
-    BvhOptions, BvhPreset, KdTreeOptions, LeftBalancedTree, PhotonTree, TriangleBvh, TriangleKdTree,
+    BvhOptions, BvhPreset, KdTreeOptions, LeftBalancedTree, PhotonSplits, PhotonTree,
+    PhotonTreeOptions, TriangleBvh, TriangleKdTree,
 };
 use caustics_geometry::glam::Vec3;
 use common::icosphere;
@@ -58,6 +59,8 @@ fn trees_over_photons_do_not_depend_on_threads() {
             Vec3::new((a * 0.37).sin(), 0.0, (a * 0.011).cos()) * f32::from(u8::from(i % 7 != 0))
         })
         .collect();
-    assert_same(|| PhotonTree::new(&photons));
+    for splits in [PhotonSplits::Halves, PhotonSplits::VoxelVolume] {
+        assert_same(|| PhotonTree::with_options(&photons, &PhotonTreeOptions { splits }));
+    }
     assert_same(|| LeftBalancedTree::new(&photons));
 }

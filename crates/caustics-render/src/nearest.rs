@@ -1,4 +1,4 @@
-use caustics_accel::{NearestScratch, PhotonTree};
+use caustics_accel::{NearestScratch, PhotonSplits, PhotonTree, PhotonTreeOptions};
 use caustics_filter::Kernel;
 use caustics_trace::Photon;
 use glam::Vec3;
@@ -65,9 +65,14 @@ impl<'a> NearestEstimate<'a> {
             None => default_radius(photons),
         };
         let positions: Vec<Vec3> = photons.iter().map(|photon| photon.position).collect();
+        // Over whole pictures faster by 4 to 5 % on average, by a quarter where photons lie on
+        // several walls: docs/acceleration.md.
+        let tree_options = PhotonTreeOptions {
+            splits: PhotonSplits::VoxelVolume,
+        };
         Ok(Self {
             photons,
-            tree: PhotonTree::new(&positions)?,
+            tree: PhotonTree::with_options(&positions, &tree_options)?,
             count: options.count,
             max_radius,
             kernel: options.kernel,

@@ -19,8 +19,8 @@ const WIDEST_STRIP: f32 = 0.75;
 /// a strip to the other; or by one standard deviation, which is blurred by so little.
 const MOST_SLANT: f32 = 0.25;
 
-/// By how much it may be off, in pixels, and in standard deviations.
-const MOST_SHIFT: [f32; 2] = [0.02, 0.1];
+/// By how much it may be off, in standard deviations.
+const MOST_SHIFT: f32 = 0.05;
 
 /// The least standard deviation, in pixels: a point for all that a picture can tell.
 const LEAST_SIGMA: f32 = 1e-3;
@@ -70,7 +70,7 @@ impl PixelGaussian {
         let long = long.sqrt().max(LEAST_SIGMA);
         let [deviation, lean] = [within.sqrt(), slope.abs()];
         let most_slant = MOST_SLANT.max(deviation);
-        let is_level = lean * long <= MOST_SHIFT[0].max(MOST_SHIFT[1] * deviation);
+        let is_level = lean * long <= MOST_SHIFT * deviation;
         let mut strips = 1.0;
         while strips < MOST_STRIPS
             && (lean > most_slant * strips || !is_level && strips * long * WIDEST_STRIP < 1.0)

@@ -1,6 +1,6 @@
 //! Rays against a scene whose objects move.
 
-use crate::intersector::closest_among;
+use crate::intersector::{closest_among, closest_among_all};
 use crate::scene::{Instance, MeshId, Scene, SceneError, Shape};
 use crate::world::World;
 use caustics_accel::{AccelError, BvhInstance, BvhOptions, InstanceBvh, Intersect, TriangleBvh};
@@ -145,6 +145,11 @@ impl Intersect for InstancedIntersector {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let closest = self.triangles.closest_hit(ray);
         closest_among(&self.spheres, self.first_sphere, ray, closest)
+    }
+
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.triangles.closest_hits(rays, hits);
+        closest_among_all(&self.spheres, self.first_sphere, rays, hits);
     }
 
     fn is_occluded(&self, ray: &Ray) -> bool {

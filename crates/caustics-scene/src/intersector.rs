@@ -54,12 +54,32 @@ impl Intersect for SceneIntersector {
         closest_among(&self.spheres, self.first_sphere, ray, closest)
     }
 
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.triangles.closest_hits(rays, hits);
+        closest_among_all(&self.spheres, self.first_sphere, rays, hits);
+    }
+
     fn is_occluded(&self, ray: &Ray) -> bool {
         self.triangles.is_occluded(ray)
             || self
                 .spheres
                 .iter()
                 .any(|sphere| sphere.intersect(ray).is_some())
+    }
+}
+
+/// The same as [`closest_among`], for many rays.
+pub(crate) fn closest_among_all(
+    spheres: &[Sphere],
+    first: u32,
+    rays: &[Ray],
+    hits: &mut [Option<Hit>],
+) {
+    if spheres.is_empty() {
+        return;
+    }
+    for (ray, hit) in rays.iter().zip(hits) {
+        *hit = closest_among(spheres, first, ray, *hit);
     }
 }
 

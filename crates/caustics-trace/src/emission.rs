@@ -33,9 +33,17 @@ impl EmissionSample {
     #[must_use]
     pub fn of(points: &PointSet, index: u32) -> Self {
         Self {
+            place: Vec2::new(points.sample(index, 2), points.sample(index, 3)),
+            ..Self::without_place(points, index)
+        }
+    }
+
+    /// Number `index` of a set, for a light without an area.
+    pub(crate) fn without_place(points: &PointSet, index: u32) -> Self {
+        Self {
             point: points.point(index),
             spacing: points.spacing(index),
-            place: Vec2::new(points.sample(index, 2), points.sample(index, 3)),
+            place: Vec2::ZERO,
             count: points.count(),
         }
     }

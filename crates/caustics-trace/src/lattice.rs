@@ -124,16 +124,23 @@ impl Lattice {
 
     /// The number in the whole set of used point `index`.
     pub(crate) fn number(&self, index: u32) -> u32 {
-        match &self.spans {
-            None => index,
-            Some(spans) => {
-                let span = spans.partition_point(|it| it.before <= index);
-                match span.checked_sub(1).and_then(|it| spans.get(it)) {
-                    Some(span) => span.first + (index - span.before),
-                    None => index,
-                }
-            }
-        }
+        let (span, _) = self.span_of(index);
+        span.first + (index - span.before)
+    }
+
+    /// The run of points that used point `index` is in, and the used points up to its end.
+    fn span_of(&self, index: u32) -> (Span, u32) {
+        let whole = Span {
+            first: 0,
+            before: 0,
+        };
+        let Some(spans) = &self.spans else {
+            return (whole, self.count);
+        };
+        let after = spans.partition_point(|it| it.before <= index);
+        let span = after.checked_sub(1).and_then(|it| spans.get(it));
+        let end = spans.get(after).map_or(self.count, |next| next.before);
+        (span.copied().unwrap_or(whole), end)
     }
 
     /// The used points before and after used point `index` of a grid, along each of its axes.
@@ -141,7 +148,8 @@ impl Lattice {
     /// Where rows differ in length, a neighbour across rows is the nearest.
     pub(crate) fn neighbours(&self, index: u32) -> [[Option<u32>; 2]; 2] {
         let grid = Grid::new(self.points.count());
-        let number = self.number(index);
+        let (span, end) = self.span_of(index);
+        let number = span.first + (index - span.before);
         let cell = grid.cell(number);
         let columns = grid.columns(cell.row);
         let along = [
@@ -156,7 +164,12 @@ impl Lattice {
             let length = grid.columns(cell.row + 1);
             number - cell.column + columns + cell.column.min(length - 1)
         });
-        [along, [below, above]].map(|pair| pair.map(|it| self.index_of(it?)))
+        // Beside a point is mostly one of the same run, which is told without a search.
+        let index_of = |number: u32| match number.checked_sub(span.first) {
+            Some(place) if place < end - span.before => Some(span.before + place),
+            _ => self.index_of(number),
+        };
+        [along, [below, above]].map(|pair| pair.map(|it| index_of(it?)))
     }
 
     /// Of a grid whose first `traced` used points are known: how many of them have all their

@@ -146,6 +146,7 @@ mod trace;
 mod traced;
 mod tracer;
 mod trail;
+mod wave;
 
 pub use area_emission::AreaSurface;
 pub use casters::{Casters, MAX_CASTERS};

@@ -8,6 +8,7 @@ use crate::emission::EmissionSample;
 use crate::ledger::EnergyLedger;
 use crate::photon::{Photon, PhotonMap};
 use crate::trace::Batch;
+use crate::wave::{WAVE, Wave};
 
 /// The part of all photons that the first, even lattice gets.
 const FIRST_SHARE: f64 = 0.5;
@@ -392,21 +393,23 @@ fn trace_cells<I: Intersect + ?Sized>(
         CounterRng::new(seed, 0).next_vec2()
     };
     let size = resolution.as_vec2().recip();
-    let mut starts = Vec::with_capacity(cells.len());
-    for &cell in cells {
-        starts.push(tracer.photons.len());
+    let emitted = |&cell: &UVec2| {
         let sample = EmissionSample {
             point: ((cell.as_vec2() + place) * size).min(Vec2::splat(1.0f32.next_down())),
             spacing: [Vec2::new(size.x, 0.0), Vec2::new(0.0, size.y)],
             place: Vec2::ZERO,
             count: resolution.x * resolution.y,
         };
-        if let Some(emission) = batch.planned.emitter().emit::<2>(batch.world, &sample) {
-            let number = u64::from(cell.y) * u64::from(resolution.x) + u64::from(cell.x);
-            let stream = number ^ (u64::from(resolution.x) << 40);
-            let mut rng = batch.planned.random(seed, stream);
-            tracer.trace(&emission, batch.planned.media(), &mut rng);
-        }
+        let emission = batch.planned.emitter().emit::<2>(batch.world, &sample)?;
+        let number = u64::from(cell.y) * u64::from(resolution.x) + u64::from(cell.x);
+        let stream = number ^ (u64::from(resolution.x) << 40);
+        Some((emission, batch.planned.random(seed, stream)))
+    };
+    let mut starts = Vec::with_capacity(cells.len());
+    let mut wave = Wave::new();
+    for cells in cells.chunks(WAVE) {
+        let media = batch.planned.media();
+        wave.trace(&mut tracer, cells.iter().map(emitted), media, &mut starts);
     }
     Part {
         photons: tracer.photons,

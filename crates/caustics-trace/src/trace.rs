@@ -1,9 +1,9 @@
 use caustics_accel::Intersect;
-use caustics_sampling::Sequence;
+use caustics_sampling::{CounterRng, Sequence};
 use caustics_scene::World;
 use glam::DVec3;
 
-use crate::emission::EmissionSample;
+use crate::emission::{Emission, EmissionSample};
 use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
@@ -11,6 +11,7 @@ use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
 use crate::traced::Traced;
 use crate::tracer::PathTracer;
+use crate::wave::{WAVE, Wave};
 
 /// Photons that one task traces: enough to share out, few enough to balance.
 const CHUNK: u32 = 2048;
@@ -263,9 +264,11 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> Traced {
         let mut tracer = self.tracer::<N>();
         let mut starts = Vec::with_capacity(range.len());
-        for index in range {
-            starts.push(tracer.photons.len());
-            self.send(&mut tracer, index);
+        let mut wave = Wave::new();
+        for start in range.clone().step_by(WAVE) {
+            let photons = start..range.end.min(start.saturating_add(WAVE as u32));
+            let emitted = photons.map(|index| self.emitted(index));
+            wave.trace(&mut tracer, emitted, self.planned.media(), &mut starts);
         }
         Traced {
             photons: tracer.photons,
@@ -277,7 +280,9 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
 
     fn trail<const N: usize>(&self, index: u32) -> PhotonTrail {
         let mut tracer = self.tracer::<N>();
-        self.send(&mut tracer, index);
+        if let Some((emission, mut rng)) = self.emitted(index) {
+            tracer.trace(&emission, self.planned.media(), &mut rng);
+        }
         let culling = &self.options.culling;
         let mut ledger = tracer.ledger;
         let landed = tracer.photons.into_iter().zip(tracer.paths);
@@ -294,12 +299,17 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         }
     }
 
-    fn send<const N: usize>(&self, tracer: &mut PathTracer<'_, I, N>, index: u32) {
+    /// A photon as its light sends it, and its random numbers.
+    fn emitted<const N: usize>(&self, index: u32) -> Option<(Emission<N>, CounterRng)> {
         let number = self.planned.point_number(index);
-        let sample = EmissionSample::of(self.planned.points(), number);
-        if let Some(emission) = self.planned.emitter().emit::<N>(self.world, &sample) {
-            let mut rng = self.planned.random(self.options.seed, u64::from(number));
-            tracer.trace(&emission, self.planned.media(), &mut rng);
-        }
+        let points = self.planned.points();
+        let sample = if self.planned.emitter().dimensions() == 2 {
+            EmissionSample::without_place(points, number)
+        } else {
+            EmissionSample::of(points, number)
+        };
+        let emission = self.planned.emitter().emit::<N>(self.world, &sample)?;
+        let rng = self.planned.random(self.options.seed, u64::from(number));
+        Some((emission, rng))
     }
 }

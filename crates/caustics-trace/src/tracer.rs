@@ -1,5 +1,5 @@
 use caustics_accel::Intersect;
-use caustics_geometry::Ray;
+use caustics_geometry::{Hit, Ray};
 use caustics_sampling::CounterRng;
 use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
@@ -23,8 +23,8 @@ const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
 
 /// A path, or a branch of one, on its way to the next surface.
 #[derive(Clone, Copy)]
-struct Branch<const N: usize> {
-    ray: Ray,
+pub(crate) struct Branch<const N: usize> {
+    pub(crate) ray: Ray,
     differential: RayDifferential<N>,
     flux: Vec3,
     media: MediumStack,
@@ -39,12 +39,13 @@ struct Branch<const N: usize> {
     source: FootprintSource,
 }
 
-/// Traces photons one at a time; holds the memory that they share.
+/// Takes photons on their ways; holds the memory that they share.
 pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     world: &'a World,
     intersect: &'a I,
     options: &'a TraceOptions,
-    pending: Vec<Branch<N>>,
+    /// Branches of the photon that is being traced.
+    pub(crate) pending: Vec<Branch<N>>,
     pub(crate) photons: Vec<Photon>,
     /// For each photon, a hash of what its path met and did there: photons of one path are parts of
     /// one smooth sheet of light.
@@ -96,9 +97,24 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         media: MediumStack,
         rng: &mut CounterRng,
     ) {
+        let threshold = self.threshold(emission);
+        let first = self.sent(emission, media);
+        self.pending.push(first);
+        while let Some(branch) = self.next() {
+            let hit = self.intersect.closest_hit(&branch.ray);
+            self.advance(branch, hit, threshold, rng);
+        }
+    }
+
+    /// Flux below which the branches of an emitted photon play roulette.
+    pub(crate) fn threshold(&self, emission: &Emission<N>) -> f32 {
+        self.options.min_weight * emission.flux.max_element()
+    }
+
+    /// Books an emitted photon, and returns it at the start of its way.
+    pub(crate) fn sent(&mut self, emission: &Emission<N>, media: MediumStack) -> Branch<N> {
         self.ledger.emit(emission.flux);
-        let threshold = self.options.min_weight * emission.flux.max_element();
-        self.pending.push(Branch {
+        Branch {
             ray: emission.ray,
             differential: emission.differential,
             flux: emission.flux,
@@ -109,20 +125,34 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             channel: None,
             path: 0,
             source: FootprintSource::Differential,
-        });
-        while let Some(branch) = self.pending.pop() {
-            self.advance(branch, threshold, rng);
         }
     }
 
-    /// Takes a branch to the next surface and queues what leaves it.
-    fn advance(&mut self, mut branch: Branch<N>, threshold: f32, rng: &mut CounterRng) {
-        if !(branch.ray.origin.is_finite() && branch.ray.direction.is_finite()) {
+    /// What rays meet.
+    pub(crate) fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.intersect.closest_hits(rays, hits);
+    }
+
+    /// The branch that goes on next, whose ray is then to be traced.
+    pub(crate) fn next(&mut self) -> Option<Branch<N>> {
+        while let Some(branch) = self.pending.pop() {
+            if branch.ray.origin.is_finite() && branch.ray.direction.is_finite() {
+                self.ledger.rays += 1;
+                return Some(branch);
+            }
             self.ledger.book(Fate::Invalid, branch.flux);
-            return;
         }
-        self.ledger.rays += 1;
-        let hit = self.intersect.closest_hit(&branch.ray);
+        None
+    }
+
+    /// Takes a branch to the surface that its ray meets and queues what leaves it.
+    pub(crate) fn advance(
+        &mut self,
+        mut branch: Branch<N>,
+        hit: Option<Hit>,
+        threshold: f32,
+        rng: &mut CounterRng,
+    ) {
         if let Some(trail) = &mut self.trail {
             trail.passes(self.world, &branch.ray, hit.as_ref());
         }

@@ -9,7 +9,7 @@ Times rays, builds and photon searches against the named peers, and writes the t
     cargo run --release -p caustics-benches --features embree,nanoflann-cpp --bin acceleration -- [options]
 
   --quick              small meshes, few photons, few runs: half a minute, for a look
-  --only A,B           parts: traces, instances, builds, searches (default: all)
+  --only A,B           parts: traces, instances, builds, searches, pictures (default: all)
   --machine TEXT       class of the machine, for the tables
   --document FILE      Markdown whose marked tables are rewritten (default: docs/acceleration.md;
                        none with --quick, or for `none`)
@@ -19,7 +19,7 @@ the feature `nanoflann-cpp` (Debian's libnanoflann-dev) only nanoflann's port to
 ";
 
 /// The parts of the program.
-const PARTS: [&str; 4] = ["traces", "instances", "builds", "searches"];
+const PARTS: [&str; 5] = ["traces", "instances", "builds", "searches", "pictures"];
 
 /// What the user asked for.
 pub(crate) struct Arguments {

@@ -7,6 +7,7 @@ mod arguments;
 mod builds;
 mod contest;
 mod instances;
+mod pictures;
 mod searches;
 mod tables;
 mod traces;
@@ -41,6 +42,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     if arguments.does("searches") {
         tables.extend(searches::measure(arguments)?);
+    }
+    if arguments.does("pictures") {
+        tables.extend(pictures::measure(arguments)?);
     }
     for (name, table) in &tables {
         println!("{name}\n\n{table}");

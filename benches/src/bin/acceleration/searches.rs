@@ -2,7 +2,9 @@
 
 use std::num::NonZeroUsize;
 
-use caustics_accel::{HashGrid, LeftBalancedTree, NearestScratch, PhotonTree};
+use caustics_accel::{
+    HashGrid, LeftBalancedTree, NearestScratch, PhotonSplits, PhotonTree, PhotonTreeOptions,
+};
 #[cfg(feature = "nanoflann-cpp")]
 use caustics_benches::nanoflann_cpp::{FoundList, Nanoflann};
 use caustics_benches::photons::{pixel_queries, surface_photons};
@@ -26,10 +28,30 @@ type Payload = Vec<[f32; 3]>;
 /// radiance estimate reads.
 type Searcher<'a> = (&'static str, Box<dyn Fn(&[Vec3]) -> f64 + Sync + 'a>);
 
+/// Our trees by where they split: the rows' names of single searches and of those in order.
+const KINDS: [(PhotonSplits, &str, &str); 2] = [
+    (
+        PhotonSplits::Halves,
+        "**PhotonTree**",
+        "**PhotonTree, in order**",
+    ),
+    (
+        PhotonSplits::VoxelVolume,
+        "**PhotonTree, by volume**",
+        "**PhotonTree, by volume, in order**",
+    ),
+];
+
+/// A photon tree, and what belongs to the photons in its order.
+struct Renumbered {
+    tree: PhotonTree,
+    payload: Payload,
+}
+
 /// Photons and everything that finds them, and what belongs to them in each one's order.
 struct Field<'a> {
-    ours: PhotonTree,
-    ours_payload: Payload,
+    /// In the order of [`KINDS`].
+    ours: Vec<Renumbered>,
     classic: LeftBalancedTree,
     grids: [(HashGrid, Payload); 2],
     kiddo: ImmutableKdTree<f32, 3>,
@@ -117,33 +139,31 @@ impl Field<'_> {
                     }),
                 ));
             }
-            searchers.push((
-                "**PhotonTree**",
-                Box::new(move |queries| {
-                    let mut scratch = NearestScratch::new();
-                    let total = queries.iter().map(|&q| {
-                        let found = self.ours.nearest(q, count, radius, &mut scratch);
-                        found
-                            .iter()
-                            .map(|n| sum(&self.ours_payload, n.index))
-                            .sum::<f64>()
-                    });
-                    total.sum()
-                }),
-            ));
-            searchers.push((
-                "**PhotonTree, in order**",
-                Box::new(move |queries| {
-                    let mut scratch = NearestScratch::new();
-                    let mut total = 0.0;
-                    self.ours
-                        .nearest_of_each(queries, count, radius, &mut scratch, |_, found| {
-                            let payload = &self.ours_payload;
+            for (Renumbered { tree, payload }, (_, single, in_order)) in self.ours.iter().zip(KINDS)
+            {
+                searchers.push((
+                    single,
+                    Box::new(move |queries| {
+                        let mut scratch = NearestScratch::new();
+                        let total = queries.iter().map(|&q| {
+                            let found = tree.nearest(q, count, radius, &mut scratch);
+                            found.iter().map(|n| sum(payload, n.index)).sum::<f64>()
+                        });
+                        total.sum()
+                    }),
+                ));
+                searchers.push((
+                    in_order,
+                    Box::new(move |queries| {
+                        let mut scratch = NearestScratch::new();
+                        let mut total = 0.0;
+                        tree.nearest_of_each(queries, count, radius, &mut scratch, |_, found| {
                             total += found.iter().map(|n| sum(payload, n.index)).sum::<f64>();
                         });
-                    total
-                }),
-            ));
+                        total
+                    }),
+                ));
+            }
             searchers.push((
                 "**LeftBalancedTree**",
                 Box::new(move |queries| {
@@ -213,17 +233,19 @@ impl Field<'_> {
                 total.sum()
             }),
         ));
-        searchers.push((
-            "**PhotonTree**",
-            Box::new(move |queries| {
-                let total = queries.iter().map(|&q| {
-                    self.ours.fold_within(q, radius, 0.0, |total, index, _| {
-                        total + sum(&self.ours_payload, index)
-                    })
-                });
-                total.sum()
-            }),
-        ));
+        for (Renumbered { tree, payload }, (_, single, _)) in self.ours.iter().zip(KINDS) {
+            searchers.push((
+                single,
+                Box::new(move |queries| {
+                    let total = queries.iter().map(|&q| {
+                        tree.fold_within(q, radius, 0.0, |total, index, _| {
+                            total + sum(payload, index)
+                        })
+                    });
+                    total.sum()
+                }),
+            ));
+        }
         searchers.push((
             "**LeftBalancedTree**",
             Box::new(move |queries| {
@@ -264,33 +286,34 @@ fn build_times(photons: &[Vec3], cell: f32, arguments: &Arguments) -> Result<Col
     let mut times = Vec::new();
     for &threads in arguments.threads() {
         times.push(pool(threads)?.install(|| {
-            medians(
-                vec![
-                    Contestant::new("kiddo", || {
-                        let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&rows);
-                        u64::from(tree.is_ok())
-                    }),
-                    #[cfg(feature = "nanoflann-cpp")]
-                    Contestant::new("nanoflann", || {
-                        let _tree = Nanoflann::new(&rows);
-                        1
-                    }),
-                    Contestant::new("nanoflann crate", || {
-                        let tree = KdTree::new(3, &dataset, L2Simple, KdTreeParams::default());
-                        u64::from(tree.is_ok())
-                    }),
-                    Contestant::new("**PhotonTree**", || {
-                        PhotonTree::new(photons).map_or(0, |tree| tree.len() as u64)
-                    }),
-                    Contestant::new("**LeftBalancedTree**", || {
-                        LeftBalancedTree::new(photons).map_or(0, |tree| tree.len() as u64)
-                    }),
-                    Contestant::new("**HashGrid**", || {
-                        HashGrid::new(photons, cell).map_or(0, |grid| grid.len() as u64)
-                    }),
-                ],
-                arguments.patience(),
-            )
+            let mut contestants = vec![
+                Contestant::new("kiddo", || {
+                    let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&rows);
+                    u64::from(tree.is_ok())
+                }),
+                #[cfg(feature = "nanoflann-cpp")]
+                Contestant::new("nanoflann", || {
+                    let _tree = Nanoflann::new(&rows);
+                    1
+                }),
+                Contestant::new("nanoflann crate", || {
+                    let tree = KdTree::new(3, &dataset, L2Simple, KdTreeParams::default());
+                    u64::from(tree.is_ok())
+                }),
+            ];
+            contestants.extend(KINDS.map(|(splits, name, _)| {
+                Contestant::new(name, move || {
+                    PhotonTree::with_options(photons, &PhotonTreeOptions { splits })
+                        .map_or(0, |tree| tree.len() as u64)
+                })
+            }));
+            contestants.push(Contestant::new("**LeftBalancedTree**", || {
+                LeftBalancedTree::new(photons).map_or(0, |tree| tree.len() as u64)
+            }));
+            contestants.push(Contestant::new("**HashGrid**", || {
+                HashGrid::new(photons, cell).map_or(0, |grid| grid.len() as u64)
+            }));
+            medians(contestants, arguments.patience())
         }));
     }
     Ok(Column {
@@ -323,8 +346,13 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
     let rows: Vec<[f32; 3]> = photons.iter().map(Vec3::to_array).collect();
     let flat: Vec<f32> = rows.iter().flatten().copied().collect();
     let dataset = MatrixDataset::new(flat, count, 3, MatrixLayout::RowMajorPoints)?;
-    let mut ours = PhotonTree::new(&photons)?;
-    let order = ours.renumber();
+    let mut ours = Vec::new();
+    for (splits, ..) in KINDS {
+        let mut tree = PhotonTree::with_options(&photons, &PhotonTreeOptions { splits })?;
+        let payload = reordered(&payload, &tree.renumber());
+        ours.push(Renumbered { tree, payload });
+    }
+    let tree = &ours[0].tree;
     // The mean distance of the 50th and of the 200th nearest photon, and the radii that hold as
     // many photons on average.
     let mut scratch = NearestScratch::new();
@@ -333,7 +361,7 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
     for (place, k) in [50, 200].into_iter().enumerate() {
         let mut total = 0.0;
         for &q in &queries {
-            let found = ours.nearest(q, k, f32::INFINITY, &mut scratch);
+            let found = tree.nearest(q, k, f32::INFINITY, &mut scratch);
             total += found
                 .last()
                 .map_or(0.0, |n| f64::from(n.distance_squared).sqrt());
@@ -341,7 +369,7 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
         distances[place] = (total / queries.len() as f64) as f32;
         let mut counted = 0_usize;
         for &q in &queries {
-            ours.within(q, distances[place], |_, _| counted += 1);
+            tree.within(q, distances[place], |_, _| counted += 1);
         }
         let wanted = (k * queries.len()) as f32 / counted as f32;
         radii[place] = distances[place] * wanted.sqrt();
@@ -353,7 +381,6 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
         Ok((grid, payload))
     };
     let field = Field {
-        ours_payload: reordered(&payload, &order),
         ours,
         classic: LeftBalancedTree::new(&photons)?,
         grids: [grid_of(radii[0])?, grid_of(radii[1])?],
@@ -381,7 +408,21 @@ fn of_size(count: usize, arguments: &Arguments) -> Result<String, Failure> {
     for question in questions {
         columns.push(ask_all(&field, question, &queries, arguments)?);
     }
-    Ok(table(&columns, queries.len()))
+    let mut memory = vec![
+        ("**LeftBalancedTree**", field.classic.memory_bytes()),
+        ("**HashGrid**", field.grids[0].0.memory_bytes()),
+    ];
+    memory.extend(
+        KINDS
+            .iter()
+            .zip(&field.ours)
+            .map(|(&(_, name, _), ours)| (name, ours.tree.memory_bytes())),
+    );
+    let bytes_of = |name: &str| {
+        let own = memory.iter().find(|of| of.0 == name)?;
+        Some(own.1 as f64 / count as f64)
+    };
+    Ok(table(&columns, queries.len(), bytes_of))
 }
 
 /// Asks every structure, after checking that all answers are the same.
@@ -419,10 +460,12 @@ fn ask_all(
     })
 }
 
-/// Builds in milliseconds; searches in thousands a second and relative to kiddo on one thread.
-fn table(columns: &[Column], queries: usize) -> String {
+/// Builds in milliseconds; searches in thousands a second and relative to kiddo on one thread;
+/// bytes a photon.
+fn table(columns: &[Column], queries: usize, bytes_of: impl Fn(&str) -> Option<f64>) -> String {
     let mut header = vec!["1 / 2 threads".to_owned()];
     header.extend(columns.iter().map(|column| column.title.clone()));
+    header.push("bytes a photon".to_owned());
     let mut table = Table::new(&header);
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in columns.iter().flat_map(|column| &column.times[0]) {
@@ -458,6 +501,7 @@ fn table(columns: &[Column], queries: usize) -> String {
             let ratio = seconds_of(&column.times[0], "kiddo").map_or(1.0, |kiddo| kiddo / first);
             cells.push(format!("{} (**{}**)", shown.join(" / "), figures(ratio)));
         }
+        cells.push(bytes_of(name).map_or_else(String::new, figures));
         table.row(&cells);
     }
     table.finish()

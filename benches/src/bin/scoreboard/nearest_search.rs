@@ -19,12 +19,6 @@ const STRIDE: u32 = 4;
 /// How many of the best on those pixels are compared on the whole picture.
 const FINALISTS: usize = 3;
 
-/// Normals of photons and receivers that are taken for one face's, as the estimate has it.
-const MIN_NORMAL_COSINE: f32 = 0.7;
-
-/// How far off the tangent plane a photon may lie, relative to the reach, as the estimate has it.
-const MAX_PLANE_DISTANCE: f32 = 0.2;
-
 /// The options with the least relative mean squared error, as found on a part of the pixels by one
 /// search for the largest count, whose photons in their order give the sums of all smaller ones;
 /// the best few are then compared on all pixels.
@@ -114,15 +108,7 @@ fn radiances_of_all(
     let tree = PhotonTree::new(&positions)?;
     let most = COUNTS.into_iter().max().unwrap_or(1);
     let of_one = |scratch: &mut NearestScratch, receiver: &Receiver| {
-        let accept = |index: u32| {
-            let photon = &photons[index as usize];
-            photon.normal.dot(receiver.normal) > MIN_NORMAL_COSINE
-                && photon.incoming.dot(receiver.normal) < 0.0
-                && (photon.position - receiver.position)
-                    .dot(receiver.normal)
-                    .abs()
-                    < MAX_PLANE_DISTANCE * reach
-        };
+        let accept = |index: u32| receiver.accepts(&photons[index as usize], reach);
         let found = tree.nearest_where(receiver.position, most, reach, accept, scratch);
         // The tree puts only the farthest in its place.
         let mut found = found.to_vec();

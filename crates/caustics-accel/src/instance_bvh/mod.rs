@@ -8,11 +8,10 @@ use caustics_geometry::glam::Affine3A;
 use caustics_geometry::{Aabb, Hit, Ray};
 
 use self::placement::Placement;
-use self::stream::ClosestHits;
-use self::traverse::{ClosestHit, Occlusion};
 use crate::box_tree::{BoxTree, Member};
 use crate::simd::Dispatch;
 use crate::triangle_bvh::layout::{Child, Node};
+use crate::triangle_bvh::stage::{ClosestHit, ClosestHits, Occlusion};
 use crate::triangles::MAX_COORDINATE;
 use crate::{AccelError, Instructions, Intersect, TriangleBvh};
 
@@ -173,18 +172,6 @@ impl InstanceBvh {
         self.build()
     }
 
-    /// The closest hits of many rays, the same as those of one after the other.
-    ///
-    /// As [`TriangleBvh::closest_hits`]: worth it where rays that follow each other lie close
-    /// together. What they share is also the transforming of the triangles.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.dispatch.run(ClosestHits {
-            tree: self,
-            rays,
-            hits,
-        });
-    }
-
     /// The instances, in the order in which they were given.
     #[must_use]
     pub fn instances(&self) -> &[BvhInstance] {
@@ -295,11 +282,21 @@ fn invalid(instance: usize) -> AccelError {
 impl Intersect for InstanceBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(ClosestHit { tree: self, ray })
+        self.dispatch.run(ClosestHit { stage: self, ray })
+    }
+
+    /// As that of [`TriangleBvh`]: worth it where rays that follow each other lie close together. What
+    /// they share is also the transforming of the triangles.
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.dispatch.run(ClosestHits {
+            stage: self,
+            rays,
+            hits,
+        });
     }
 
     #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        self.dispatch.run(Occlusion { tree: self, ray })
+        self.dispatch.run(Occlusion { stage: self, ray })
     }
 }

@@ -1,72 +1,49 @@
 //! Neighbouring rays that share their way through the instances and into their meshes.
 
+use caustics_geometry::Ray;
 use caustics_geometry::glam::Vec3;
-use caustics_geometry::{Hit, Ray};
 
 use super::placement::Placement;
-use super::traverse::{Among, Inside, closest_hit, place};
+use super::traverse::{Among, Inside, place};
 use super::{InstanceBvh, Placed};
-use crate::simd::{Kernel, Lanes, WIDTH};
+use crate::simd::{Lanes, WIDTH};
 use crate::triangle_bvh::bundle::{Bundle, Sides, size};
-use crate::triangle_bvh::gather::{Gathered, RayRow, load};
-use crate::triangle_bvh::layout::Child;
-use crate::triangle_bvh::stream::{
-    MeetTogether, Stage, fetch, find_closest, search_together, trace_all,
-};
-use crate::triangle_bvh::traverse::{Tree, search};
+use crate::triangle_bvh::gather::{RayRow, Together, load};
+use crate::triangle_bvh::layout::{Child, Node};
+use crate::triangle_bvh::stage::Stage;
+use crate::triangle_bvh::stream::{MeetTogether, fetch, find_closest, search_together};
+use crate::triangle_bvh::traverse::{Meet, Tree, search};
 use crate::triangles::{ClosestRow, ShearedRow};
 
-/// The closest hit of each ray.
-pub(super) struct ClosestHits<'a> {
-    pub(super) tree: &'a InstanceBvh,
-    pub(super) rays: &'a [Ray],
-    pub(super) hits: &'a mut [Option<Hit>],
-}
-
-impl Kernel for ClosestHits<'_> {
-    type Output = ();
-
+impl Stage for InstanceBvh {
     #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        trace_all(lanes, self.tree, self.rays, self.hits);
-    }
-}
-
-impl<L: Lanes> Stage<L> for InstanceBvh {
-    #[inline(always)]
-    fn trace_together<const ROWS: usize>(
-        &self,
-        lanes: L,
-        rays: &[Ray],
-        gathered: &mut Gathered<ROWS>,
-    ) {
-        let Gathered {
-            world,
-            bundle,
-            sheared,
-            closest,
-        } = gathered;
-        let among = AmongTogether {
-            tree: self,
-            rays,
-            world,
-            sheared,
-        };
-        search_together(lanes, &self.nodes, self.root, bundle, &among, closest);
+    fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     #[inline(always)]
-    fn trace_alone(&self, lanes: L, ray: &Ray) -> Option<Hit> {
-        closest_hit(lanes, self, ray)
+    fn root(&self) -> Child {
+        self.root
+    }
+
+    #[inline(always)]
+    fn alone<'a, L: Lanes>(&'a self, lanes: L, ray: &'a Ray) -> impl Meet<L> {
+        Among::new(lanes, self, ray)
+    }
+
+    #[inline(always)]
+    fn together<'a, L: Lanes, const ROWS: usize>(
+        &'a self,
+        rays: Together<'a, ROWS>,
+    ) -> impl MeetTogether<L, ROWS> {
+        AmongTogether { tree: self, rays }
     }
 }
 
 /// A bundle in the world, among the boxes of instances.
 struct AmongTogether<'a, const ROWS: usize> {
     tree: &'a InstanceBvh,
-    rays: &'a [Ray],
-    world: &'a [RayRow; ROWS],
-    sheared: &'a [ShearedRow; ROWS],
+    rays: Together<'a, ROWS>,
 }
 
 impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for AmongTogether<'_, ROWS> {
@@ -75,15 +52,21 @@ impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for AmongTogether<'_, RO
 
     #[inline(always)]
     fn find_closest(&self, lanes: L, leaf: Child, active: u64, closest: &mut [ClosestRow; ROWS]) {
+        let Together {
+            rays,
+            world,
+            sheared,
+            ..
+        } = self.rays;
         for placed in &self.tree.placed[leaf.blocks()] {
             let inside = InsideTogether {
                 mesh: self.tree.instances[placed.instance as usize].mesh.tree(),
                 placed,
-                rays: self.rays,
-                sheared: self.sheared,
+                rays,
+                sheared,
             };
             // Turned, the rays may enter boxes by different sides.
-            if let Some(bundle) = bundle_inside(lanes, &placed.placement, self.world) {
+            if let Some(bundle) = bundle_inside(lanes, &placed.placement, world) {
                 let Tree { nodes, root, .. } = inside.mesh;
                 search_together(lanes, nodes, root, &bundle, &inside, closest);
                 continue;
@@ -99,7 +82,7 @@ impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for AmongTogether<'_, RO
 
     #[inline(always)]
     fn search_alone(&self, lanes: L, node: Child, ray: usize, closest: &mut ClosestRow) {
-        let among = Among::new(lanes, self.tree, &self.rays[ray]);
+        let among = Among::new(lanes, self.tree, &self.rays.rays[ray]);
         let mut alone = closest.get(ray % WIDTH, 0);
         search(lanes, &self.tree.nodes, node, &among, &mut alone);
         closest.set(ray % WIDTH, &alone);

@@ -1,60 +1,13 @@
 //! The way of a ray through the instances and into their meshes.
 
-use caustics_geometry::{Hit, Ray};
+use caustics_geometry::Ray;
 
 use super::placement::Placement;
 use super::{InstanceBvh, Placed};
-use crate::simd::{Kernel, Lanes, Row};
+use crate::simd::{Lanes, Row};
 use crate::triangle_bvh::layout::{Child, Node};
 use crate::triangle_bvh::traverse::{Meet, Slabs, search, search_any, splat};
-use crate::triangles::{Block, Closest, ShearedRay, WIDEN, is_usable, lower_end};
-
-/// The closest hit of a ray.
-pub(super) struct ClosestHit<'a> {
-    pub(super) tree: &'a InstanceBvh,
-    pub(super) ray: &'a Ray,
-}
-
-impl Kernel for ClosestHit<'_> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        closest_hit(lanes, self.tree, self.ray)
-    }
-}
-
-#[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(lanes: L, tree: &InstanceBvh, ray: &Ray) -> Option<Hit> {
-    if !is_usable(ray) {
-        return None;
-    }
-    let mut closest = Closest::new(ray);
-    let among = Among::new(lanes, tree, ray);
-    search(lanes, &tree.nodes, tree.root, &among, &mut closest);
-    closest.hit
-}
-
-/// Whether a ray hits anything.
-pub(super) struct Occlusion<'a> {
-    pub(super) tree: &'a InstanceBvh,
-    pub(super) ray: &'a Ray,
-}
-
-impl Kernel for Occlusion<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> bool {
-        let Self { tree, ray } = self;
-        if !is_usable(ray) {
-            return false;
-        }
-        let among = Among::new(lanes, tree, ray);
-        let limit = ray.t_max.next_down();
-        search_any(lanes, &tree.nodes, tree.root, &among, limit)
-    }
-}
+use crate::triangles::{Block, Closest, ShearedRay, lower_end};
 
 /// A ray in the world, among the boxes of instances.
 pub(super) struct Among<'a, F> {
@@ -121,14 +74,10 @@ impl<L: Lanes> Meet<L> for Among<'_, L::Floats> {
 /// moved and boxes grown by more than that; its triangles in the world, where their vertices are
 /// to the bit those of the flattened mesh.
 pub(super) struct Inside<'a, F> {
-    /// By axis: the origin moved back, for the side where boxes are entered ...
-    origin_near: [F; 3],
-    /// ... and forth, for the side where they are left.
+    /// With the origin moved back, for the side where boxes are entered ...
+    slabs: Slabs<F>,
+    /// ... and, by axis, forth, for the side where they are left.
     origin_far: [F; 3],
-    inverse_near: [F; 3],
-    inverse_far: [F; 3],
-    near_side: [usize; 3],
-    t_min: F,
     placement: &'a Placement,
     sheared: &'a ShearedRay,
     blocks: &'a [Block],
@@ -147,23 +96,21 @@ impl<'a, F: Copy> Inside<'a, F> {
         let origin = placement.point_to_object(ray.origin).to_array();
         let direction = placement.direction_to_object(ray.direction).to_array();
         let pad = placement.pad(ray.origin);
-        let inverse = direction.map(|d| 1.0 / d);
-        let near_side = direction.map(|d| usize::from(d.is_sign_negative()));
         // Entering by the lower side, the box begins earlier.
         let mut back = origin;
         let mut forth = origin;
         for axis in 0..3 {
-            let pad = if near_side[axis] == 0 { pad } else { -pad };
+            let pad = if direction[axis].is_sign_negative() {
+                -pad
+            } else {
+                pad
+            };
             back[axis] += pad;
             forth[axis] -= pad;
         }
         Self {
-            origin_near: splat(lanes, back),
+            slabs: Slabs::along(lanes, back, direction, lower_end(ray)),
             origin_far: splat(lanes, forth),
-            inverse_near: splat(lanes, inverse),
-            inverse_far: splat(lanes, inverse.map(|i| i * WIDEN)),
-            near_side,
-            t_min: lanes.splat(lower_end(ray)),
             placement,
             sheared,
             blocks,
@@ -175,22 +122,7 @@ impl<'a, F: Copy> Inside<'a, F> {
 impl<L: Lanes> Meet<L> for Inside<'_, L::Floats> {
     #[inline(always)]
     fn boxes(&self, lanes: L, node: &Node, limit: L::Floats) -> (L::Floats, u32) {
-        // As for a ray in its own frame; see there about NaN.
-        let mut near = self.t_min;
-        let mut far = limit;
-        for axis in 0..3 {
-            let [lower, upper] = &node.bounds[axis];
-            let (enter, leave) = if self.near_side[axis] == 0 {
-                (lower, upper)
-            } else {
-                (upper, lower)
-            };
-            let enter = lanes.sub(lanes.load(enter), self.origin_near[axis]);
-            let leave = lanes.sub(lanes.load(leave), self.origin_far[axis]);
-            near = lanes.max(lanes.mul(enter, self.inverse_near[axis]), near);
-            far = lanes.min(lanes.mul(leave, self.inverse_far[axis]), far);
-        }
-        (near, lanes.bits(lanes.at_most(near, far)))
+        self.slabs.meet_from(lanes, &self.origin_far, node, limit)
     }
 
     #[inline(always)]

@@ -6,8 +6,9 @@ use super::{PhotonTree, Subtree};
 use crate::neighbour::{distance_squared_of, index_of};
 use crate::simd::{Kernel, Lanes, Stack, WIDTH, next_lane};
 
-/// Enough for the far children on one path: the tree is balanced, with fewer than 2^32 buckets.
-const STACK: usize = 32;
+/// Enough for the far children on one path: 32 levels by heuristic, and below them at most 28 of
+/// halves, since there are fewer than 2^32 points and a bucket holds 2^4.
+const STACK: usize = 64;
 
 /// A subtree that is yet to be searched.
 #[derive(Clone, Copy, Debug)]
@@ -249,16 +250,11 @@ impl<C: Collector> Kernel for Search<'_, C> {
         // A negative radius gives a negative bound and so finds nothing.
         let mut bound = self.radius * self.radius.abs();
         let mut stack = Stack::<Waiting, STACK>::new();
-        let buckets = self.tree.buckets.len() as u32;
-        if buckets == 0 {
+        if self.tree.is_empty() {
             return self.collector.finish();
         }
         stack.push(Waiting {
-            subtree: Subtree {
-                split: 0,
-                bucket: 0,
-                buckets,
-            },
+            subtree: self.tree.root(),
             offset: [0.0; 3],
             distance_squared: 0.0,
         });
@@ -273,8 +269,8 @@ impl<C: Collector> Kernel for Search<'_, C> {
             } = waiting;
             while subtree.buckets > 1 {
                 let split = self.tree.splits[subtree.split as usize];
-                let axis = split.axis as usize & 3;
-                let (left, right) = subtree.children();
+                let axis = split.axis();
+                let (left, right) = subtree.children(&split);
                 let to_left = query[axis] - split.left;
                 let to_right = split.right - query[axis];
                 // The nearer side lies within this subtree's half-spaces already.

@@ -38,6 +38,15 @@ pub(crate) struct Gathered<const ROWS: usize> {
     pub(crate) closest: [ClosestRow; ROWS],
 }
 
+/// The same without what they have hit.
+#[derive(Clone, Copy)]
+pub(crate) struct Together<'a, const ROWS: usize> {
+    pub(crate) rays: &'a [Ray],
+    pub(crate) world: &'a [RayRow; ROWS],
+    pub(crate) bundle: &'a Bundle<ROWS>,
+    pub(crate) sheared: &'a [ShearedRow; ROWS],
+}
+
 impl<const ROWS: usize> Gathered<ROWS> {
     /// Room for rays, to be used again and again: clearing it takes longer than a small tree.
     pub(crate) fn new() -> Self {

@@ -4,6 +4,7 @@ mod collapse;
 pub(crate) mod gather;
 pub(crate) mod layout;
 mod refit;
+pub(crate) mod stage;
 pub(crate) mod stream;
 pub(crate) mod traverse;
 
@@ -15,8 +16,8 @@ use rayon::prelude::*;
 use self::binary_tree::{BinaryTree, TriangleBounds};
 use self::collapse::{WideTree, collapse};
 use self::layout::{Child, Node};
-use self::stream::ClosestHits;
-use self::traverse::{ClosestHit, MAX_DEPTH, Occlusion, Tree};
+use self::stage::{ClosestHit, ClosestHits, Occlusion};
+use self::traverse::{MAX_DEPTH, Tree};
 use crate::simd::Dispatch;
 use crate::triangles::{self, Block, can_be_hit, corners_of, validate};
 use crate::{AccelError, Instructions, Intersect};
@@ -177,20 +178,6 @@ impl TriangleBvh {
             + self.blocks.capacity() * size_of::<Block>()
     }
 
-    /// The closest hits of many rays, the same as those of one after the other.
-    ///
-    /// Worth it where rays that follow each other lie close together, as those from a lattice over
-    /// a light do: in Morton order 64 at a time share their way through the tree, in rows sixteen.
-    /// Rays that do not keep together are traced one by one. The shorter of the two
-    /// slices says how many there are.
-    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.dispatch.run(ClosestHits {
-            tree: self.tree(),
-            rays,
-            hits,
-        });
-    }
-
     pub(crate) fn tree(&self) -> Tree<'_> {
         Tree {
             nodes: &self.nodes,
@@ -243,17 +230,23 @@ impl TriangleBvh {
 impl Intersect for TriangleBvh {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.dispatch.run(ClosestHit {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(ClosestHit { stage: self, ray })
+    }
+
+    /// Worth it where rays that follow each other lie close together, as those from a lattice over
+    /// a light do: in Morton order 64 at a time share their way through the tree, in rows sixteen.
+    /// Rays that do not keep together are traced one by one. The shorter of the two
+    /// slices says how many there are.
+    fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.dispatch.run(ClosestHits {
+            stage: self,
+            rays,
+            hits,
+        });
     }
 
     #[inline]
     fn is_occluded(&self, ray: &Ray) -> bool {
-        self.dispatch.run(Occlusion {
-            tree: self.tree(),
-            ray,
-        })
+        self.dispatch.run(Occlusion { stage: self, ray })
     }
 }

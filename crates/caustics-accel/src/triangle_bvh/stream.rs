@@ -3,10 +3,11 @@
 use caustics_geometry::{Hit, Ray};
 
 use super::bundle::{Bundle, Hull, greatest};
-use super::gather::{Gathered, are_compact};
+use super::gather::{Gathered, Together, are_compact};
 use super::layout::{Child, Node};
-use super::traverse::{InPlace, STACK, Tree, child_of, closest_hit, entry, near_of, search};
-use crate::simd::{Kernel, Lanes, Stack, WIDTH, next_lane, prefetch};
+use super::stage::{Stage, closest_hit};
+use super::traverse::{InPlace, STACK, Tree, child_of, entry, near_of, search};
+use crate::simd::{Lanes, Stack, WIDTH, next_lane, prefetch};
 use crate::triangles::{Block, ClosestRow, ShearedRow, WIDEN};
 
 /// Rows of rays in a large bundle, for rays that follow each other in squares ...
@@ -21,41 +22,11 @@ const ALONE: u32 = 3;
 /// its triangles.
 const ALONE_IN_LEAF: u32 = 2;
 
-/// The closest hit of each ray.
-pub(super) struct ClosestHits<'a> {
-    pub(super) tree: Tree<'a>,
-    pub(super) rays: &'a [Ray],
-    pub(super) hits: &'a mut [Option<Hit>],
-}
-
-impl Kernel for ClosestHits<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        trace_all(lanes, &self.tree, self.rays, self.hits);
-    }
-}
-
-/// What bundles are traced through.
-pub(crate) trait Stage<L: Lanes> {
-    /// The closest hits of rays that keep together.
-    fn trace_together<const ROWS: usize>(
-        &self,
-        lanes: L,
-        rays: &[Ray],
-        gathered: &mut Gathered<ROWS>,
-    );
-
-    /// The closest hit of one ray.
-    fn trace_alone(&self, lanes: L, ray: &Ray) -> Option<Hit>;
-}
-
 /// Traces the rays in as large bundles as keep together.
 #[inline(always)]
 pub(crate) fn trace_all<L: Lanes>(
     lanes: L,
-    stage: &impl Stage<L>,
+    stage: &impl Stage,
     rays: &[Ray],
     hits: &mut [Option<Hit>],
 ) {
@@ -70,7 +41,7 @@ pub(crate) fn trace_all<L: Lanes>(
         for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
             if !trace_bundle(lanes, stage, &mut small, rays, hits) {
                 for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = stage.trace_alone(lanes, ray);
+                    *hit = closest_hit(lanes, stage, ray);
                 }
             }
         }
@@ -81,7 +52,7 @@ pub(crate) fn trace_all<L: Lanes>(
 #[inline(always)]
 fn trace_bundle<L: Lanes, const ROWS: usize>(
     lanes: L,
-    stage: &impl Stage<L>,
+    stage: &impl Stage,
     gathered: &mut Gathered<ROWS>,
     rays: &[Ray],
     hits: &mut [Option<Hit>],
@@ -89,42 +60,25 @@ fn trace_bundle<L: Lanes, const ROWS: usize>(
     if !gathered.take(lanes, rays) {
         return false;
     }
-    stage.trace_together(lanes, rays, gathered);
-    for (hits, closest) in hits.chunks_mut(WIDTH).zip(&gathered.closest) {
+    let Gathered {
+        world,
+        bundle,
+        sheared,
+        closest,
+    } = gathered;
+    let leaves = stage.together::<L, ROWS>(Together {
+        rays,
+        world,
+        bundle,
+        sheared,
+    });
+    search_together(lanes, stage.nodes(), stage.root(), bundle, &leaves, closest);
+    for (hits, closest) in hits.chunks_mut(WIDTH).zip(&*closest) {
         for (lane, hit) in hits.iter_mut().enumerate() {
             *hit = closest.hit(lane);
         }
     }
     true
-}
-
-impl<L: Lanes> Stage<L> for Tree<'_> {
-    #[inline(always)]
-    fn trace_together<const ROWS: usize>(
-        &self,
-        lanes: L,
-        rays: &[Ray],
-        gathered: &mut Gathered<ROWS>,
-    ) {
-        let Gathered {
-            bundle,
-            sheared,
-            closest,
-            ..
-        } = gathered;
-        let together = InPlaceTogether {
-            tree: *self,
-            rays,
-            bundle,
-            sheared,
-        };
-        search_together(lanes, self.nodes, self.root, bundle, &together, closest);
-    }
-
-    #[inline(always)]
-    fn trace_alone(&self, lanes: L, ray: &Ray) -> Option<Hit> {
-        closest_hit(lanes, *self, ray)
-    }
 }
 
 /// A bundle as the leaves of a tree meet it. Rays are numbered throughout all rows; a set of them
@@ -141,11 +95,9 @@ pub(crate) trait MeetTogether<L: Lanes, const ROWS: usize> {
 }
 
 /// A bundle and the triangles of a tree, both where the caller has them.
-struct InPlaceTogether<'a, const ROWS: usize> {
-    tree: Tree<'a>,
-    rays: &'a [Ray],
-    bundle: &'a Bundle<ROWS>,
-    sheared: &'a [ShearedRow; ROWS],
+pub(super) struct InPlaceTogether<'a, const ROWS: usize> {
+    pub(super) tree: Tree<'a>,
+    pub(super) rays: Together<'a, ROWS>,
 }
 
 impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for InPlaceTogether<'_, ROWS> {
@@ -156,19 +108,26 @@ impl<L: Lanes, const ROWS: usize> MeetTogether<L, ROWS> for InPlaceTogether<'_, 
 
     #[inline(always)]
     fn find_closest(&self, lanes: L, leaf: Child, active: u64, closest: &mut [ClosestRow; ROWS]) {
+        let Together { rays, sheared, .. } = self.rays;
         for block in &self.tree.blocks[leaf.blocks()] {
-            find_closest(lanes, block, 0, self.rays, self.sheared, active, closest);
+            find_closest(lanes, block, 0, rays, sheared, active, closest);
         }
     }
 
     #[inline(always)]
     fn search_alone(&self, lanes: L, node: Child, ray: usize, closest: &mut ClosestRow) {
+        let Together {
+            rays,
+            bundle,
+            sheared,
+            ..
+        } = self.rays;
         let (row, lane) = (ray / WIDTH, ray % WIDTH);
         let in_place = InPlace {
-            slabs: self.bundle.rows[row].slabs(lanes, self.bundle.sides.near, lane),
-            sheared: &self.sheared[row].ray(lane),
+            slabs: bundle.rows[row].slabs(lanes, bundle.sides.near, lane),
+            sheared: sheared[row].ray(lane),
             blocks: self.tree.blocks,
-            ray: &self.rays[ray],
+            ray: &rays[ray],
         };
         let mut alone = closest.get(lane, 0);
         search(lanes, self.tree.nodes, node, &in_place, &mut alone);

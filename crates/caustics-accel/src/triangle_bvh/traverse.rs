@@ -1,10 +1,10 @@
 //! The way of a ray through the tree.
 
-use caustics_geometry::{Hit, Ray};
+use caustics_geometry::Ray;
 
 use super::layout::{Child, Node};
-use crate::simd::{Kernel, Lanes, Row, Stack, next_lane};
-use crate::triangles::{Block, Closest, ShearedRay, WIDEN, is_usable, lower_end};
+use crate::simd::{Lanes, Row, Stack, next_lane};
+use crate::triangles::{Block, Closest, ShearedRay, WIDEN, lower_end};
 
 /// What traversal reads.
 #[derive(Clone, Copy)]
@@ -12,36 +12,6 @@ pub(crate) struct Tree<'a> {
     pub(crate) nodes: &'a [Node],
     pub(crate) blocks: &'a [Block],
     pub(crate) root: Child,
-}
-
-/// The closest hit of a ray.
-pub(crate) struct ClosestHit<'a> {
-    pub(crate) tree: Tree<'a>,
-    pub(crate) ray: &'a Ray,
-}
-
-impl Kernel for ClosestHit<'_> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        closest_hit(lanes, self.tree, self.ray)
-    }
-}
-
-/// Whether a ray hits anything.
-pub(crate) struct Occlusion<'a> {
-    pub(crate) tree: Tree<'a>,
-    pub(crate) ray: &'a Ray,
-}
-
-impl Kernel for Occlusion<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> bool {
-        is_occluded(lanes, self.tree, self.ray)
-    }
 }
 
 /// Entries that wait at most; see [`MAX_DEPTH`].
@@ -74,24 +44,46 @@ impl<F: Copy> Slabs<F> {
     pub(crate) fn new<L: Lanes<Floats = F>>(lanes: L, ray: &Ray) -> Self {
         let origin = ray.origin.to_array();
         let direction = ray.direction.to_array();
+        Self::along(lanes, origin, direction, lower_end(ray))
+    }
+
+    #[inline(always)]
+    pub(crate) fn along<L: Lanes<Floats = F>>(
+        lanes: L,
+        origin: [f32; 3],
+        direction: [f32; 3],
+        t_min: f32,
+    ) -> Self {
         let inverse = direction.map(|d| 1.0 / d);
         Self {
             origin: splat(lanes, origin),
             inverse_near: splat(lanes, inverse),
             inverse_far: splat(lanes, inverse.map(|i| i * WIDEN)),
             near_side: direction.map(|d| usize::from(d.is_sign_negative())),
-            t_min: lanes.splat(lower_end(ray)),
+            t_min: lanes.splat(t_min),
         }
     }
 
     /// Where the ray enters the children's boxes, and which ones it meets before `limit`.
     #[inline(always)]
     pub(crate) fn meet<L: Lanes<Floats = F>>(&self, lanes: L, node: &Node, limit: F) -> (F, u32) {
+        self.meet_from(lanes, &self.origin, node, limit)
+    }
+
+    /// The same with an origin of its own for the side where the ray leaves.
+    #[inline(always)]
+    pub(crate) fn meet_from<L: Lanes<Floats = F>>(
+        &self,
+        lanes: L,
+        origin_far: &[F; 3],
+        node: &Node,
+        limit: F,
+    ) -> (F, u32) {
         // A ray that runs in the plane of a box's side has 0 * inf = NaN there. Such a ray counts
         // as inside that slab: the minimum and maximum pass over a NaN in their first argument.
         let mut near = self.t_min;
         let mut far = limit;
-        for axis in 0..3 {
+        for (axis, &origin_far) in origin_far.iter().enumerate() {
             let [lower, upper] = &node.bounds[axis];
             let (enter, leave) = if self.near_side[axis] == 0 {
                 (lower, upper)
@@ -99,7 +91,7 @@ impl<F: Copy> Slabs<F> {
                 (upper, lower)
             };
             let enter = lanes.sub(lanes.load(enter), self.origin[axis]);
-            let leave = lanes.sub(lanes.load(leave), self.origin[axis]);
+            let leave = lanes.sub(lanes.load(leave), origin_far);
             near = lanes.max(lanes.mul(enter, self.inverse_near[axis]), near);
             far = lanes.min(lanes.mul(leave, self.inverse_far[axis]), far);
         }
@@ -139,9 +131,21 @@ pub(crate) trait Meet<L: Lanes> {
 /// A ray and the triangles of a tree, both where the caller has them.
 pub(crate) struct InPlace<'a, F> {
     pub(crate) slabs: Slabs<F>,
-    pub(crate) sheared: &'a ShearedRay,
+    pub(crate) sheared: ShearedRay,
     pub(crate) blocks: &'a [Block],
     pub(crate) ray: &'a Ray,
+}
+
+impl<'a, F: Copy> InPlace<'a, F> {
+    #[inline(always)]
+    pub(crate) fn new<L: Lanes<Floats = F>>(lanes: L, blocks: &'a [Block], ray: &'a Ray) -> Self {
+        Self {
+            slabs: Slabs::new(lanes, ray),
+            sheared: ShearedRay::new(ray),
+            blocks,
+            ray,
+        }
+    }
 }
 
 impl<L: Lanes> Meet<L> for InPlace<'_, L::Floats> {
@@ -195,22 +199,6 @@ fn descend(stack: &mut Stack<u64, STACK>, node: &Node, mut met: u32, near: &Row)
     child_of(nearest)
 }
 
-#[inline(always)]
-pub(crate) fn closest_hit<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> Option<Hit> {
-    if !is_usable(ray) {
-        return None;
-    }
-    let mut closest = Closest::new(ray);
-    let in_place = InPlace {
-        slabs: Slabs::new(lanes, ray),
-        sheared: &ShearedRay::new(ray),
-        blocks: tree.blocks,
-        ray,
-    };
-    search(lanes, tree.nodes, tree.root, &in_place, &mut closest);
-    closest.hit
-}
-
 /// Looks below one child for something closer.
 #[inline(always)]
 pub(crate) fn search<L: Lanes>(
@@ -246,26 +234,6 @@ pub(crate) fn search<L: Lanes>(
             }
         }
     }
-}
-
-#[inline(always)]
-fn is_occluded<L: Lanes>(lanes: L, tree: Tree<'_>, ray: &Ray) -> bool {
-    if !is_usable(ray) {
-        return false;
-    }
-    let in_place = InPlace {
-        slabs: Slabs::new(lanes, ray),
-        sheared: &ShearedRay::new(ray),
-        blocks: tree.blocks,
-        ray,
-    };
-    search_any(
-        lanes,
-        tree.nodes,
-        tree.root,
-        &in_place,
-        ray.t_max.next_down(),
-    )
 }
 
 /// Looks below one child for anything at no more than `limit`.

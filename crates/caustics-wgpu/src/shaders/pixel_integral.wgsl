@@ -4,11 +4,16 @@
 
 // Where the normal distribution ends, in standard deviations.
 const INTEGRAL_CUT: f32 = 3.0;
-// Strips that a pixel is cut into across the longer extent: the least, and the most for short ones.
-const LEAST_STRIPS: f32 = 4.0;
+// Strips that a pixel is cut into across the longer extent, at most.
 const MOST_STRIPS: f32 = 32.0;
-// The widest strip, in standard deviations along the longer extent.
+// The widest strip, in standard deviations along the longer extent, where it matters at what place in
+// the strip its flux has its mean.
 const WIDEST_STRIP: f32 = 0.75;
+// By how much, in pixels, the middle may slant along the shorter extent from one end of a strip to the
+// other; or by one standard deviation.
+const MOST_SLANT: f32 = 0.25;
+// By how much it may be off, in standard deviations.
+const MOST_SHIFT: f32 = 0.05;
 // The least standard deviation, in pixels.
 const LEAST_SIGMA: f32 = 1e-3;
 // The part of the normal distribution that is not cut off.
@@ -37,8 +42,13 @@ fn pixel_gaussian(center: vec2<f32>, c: Covariance) -> PixelGaussian {
     // What is left of the shorter variance in one place, and what the strip's own extent adds.
     var within = max(variances.y - g.slope * c.y, 0.0);
     g.long = max(sqrt(variances.x), LEAST_SIGMA);
-    var strips = LEAST_STRIPS;
-    while strips * g.long * WIDEST_STRIP < 1.0 && strips < MOST_STRIPS {
+    let deviation = sqrt(within);
+    let lean = abs(g.slope);
+    let most_slant = max(MOST_SLANT, deviation);
+    let is_level = lean * g.long <= MOST_SHIFT * deviation;
+    var strips = 1.0;
+    while strips < MOST_STRIPS
+        && (lean > most_slant * strips || (!is_level && strips * g.long * WIDEST_STRIP < 1.0)) {
         strips *= 2.0;
     }
     let strip = min(1.0 / strips, 2.0 * INTEGRAL_CUT * g.long);
