@@ -25,7 +25,7 @@ const LEVELS: usize = 7;
 
 /// The least standard deviation of a footprint, in pixels of a level, that may be splatted there:
 /// linear interpolation between the level's pixels then errs by 3 % of the footprint's peak.
-const LEVEL_SIGMA: f32 = 1.4;
+const LEVEL_SIGMA: f32 = 2.0;
 
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;

@@ -52,8 +52,12 @@ fn scene(places: &[Affine3A]) -> Scene {
 
 fn same(world: &World, ours: &InstancedIntersector, rays: &[Ray]) -> Result<(), TestCaseError> {
     let flat = world.intersector(&BvhOptions::default()).unwrap();
-    for ray in rays {
+    let (mut many, mut flat_many) = (vec![None; rays.len()], vec![None; rays.len()]);
+    ours.closest_hits(rays, &mut many);
+    flat.closest_hits(rays, &mut flat_many);
+    for ((ray, many), flat_many) in rays.iter().zip(many).zip(flat_many) {
         let hit = ours.closest_hit(ray);
+        prop_assert_eq!((hit, hit), (many, flat_many), "{:?}", ray);
         prop_assert_eq!(hit, flat.closest_hit(ray), "{:?}", ray);
         prop_assert_eq!(ours.is_occluded(ray), flat.is_occluded(ray));
         if let Some(hit) = hit {

@@ -1,4 +1,4 @@
-//! Photons that come in parts are those that come at once.
+//! Photons that come in parts, or alone, are those that come at once.
 
 mod common;
 
@@ -7,7 +7,8 @@ use caustics_sampling::Sequence;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::Vec3;
 use caustics_trace::{
-    Culling, EmissionPlan, Fate, FootprintSource, PhotonMap, PhotonStream, TraceOptions, trace_plan,
+    Branching, Culling, EmissionPlan, Fate, FootprintSource, PhotonMap, PhotonStream, TraceOptions,
+    trace_photon, trace_plan,
 };
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 
@@ -97,6 +98,39 @@ fn all_parts_are_the_whole() {
             // Nothing more comes.
             let none = stream.advance(&world, &rays, &plan, &options, 100);
             assert_eq!(none.expect("valid options"), PhotonMap::default());
+        }
+    }
+}
+
+#[test]
+fn photons_side_by_side_are_as_alone() {
+    let (world, rays) = flattened(&scene());
+    for branching in [
+        Branching::Roulette,
+        Branching::SplitFirst,
+        Branching::SplitAll,
+    ] {
+        let options = TraceOptions {
+            photons: 3000,
+            branching,
+            check_footprints: false,
+            ..TraceOptions::default()
+        };
+        let plan = EmissionPlan::new(&world, &rays, &options).expect("valid options");
+        let together = trace_plan(&world, &rays, &plan, &options, &|_| {}).expect("valid options");
+        let mut alone = PhotonMap::default();
+        for photon in 0..plan.count() {
+            let mut trail =
+                trace_photon(&world, &rays, &plan, &options, photon).expect("valid options");
+            alone.photons.append(&mut trail.photons);
+            alone.ledger.merge(&trail.ledger);
+        }
+        assert!(alone.photons.len() > 1000, "{branching:?}");
+        assert!(alone.photons == together.photons, "{branching:?}");
+        assert_eq!(alone.ledger.rays, together.ledger.rays);
+        for fate in Fate::ALL {
+            let counts = [&alone, &together].map(|it| it.ledger.entry(fate).count);
+            assert_eq!(counts[0], counts[1], "{branching:?} {}", fate.name());
         }
     }
 }

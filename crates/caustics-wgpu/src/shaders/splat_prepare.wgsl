@@ -2,7 +2,7 @@
 // CPU twin: `Splat::prepare` of caustics-render's `splat.rs`.
 
 // The least standard deviation, in pixels of a level, that may be splatted there.
-const LEVEL_SIGMA: f32 = 1.4;
+const LEVEL_SIGMA: f32 = 2.0;
 // Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
 // Footprints longer than this many pixels are not summed.
