@@ -395,8 +395,7 @@ impl EmissionBatch {
             .sum();
         let saved = (1.0 - self.accuracy) / self.accuracy.max(1e-3) * f64::from(self.share);
         let cost = MAP_COST + TRIANGLE_COST * triangles as f64;
-        let is_refined = options.refinement.levels > 0 && options.sequence == Sequence::Grid;
-        if options.aim != Aim::Casters || is_refined || saved < cost {
+        if options.aim != Aim::Casters || saved < cost {
             return None;
         }
         let map = ProjectionMap::of(world, objects, self.emitter.domain())?;

@@ -7,6 +7,7 @@ use glam::{IVec2, UVec2, Vec2, Vec3};
 use crate::emission::EmissionSample;
 use crate::ledger::EnergyLedger;
 use crate::photon::{Photon, PhotonMap};
+use crate::projection_map::ProjectionMap;
 use crate::trace::Batch;
 use crate::wave::{WAVE, Wave};
 
@@ -45,8 +46,16 @@ pub(crate) fn trace_refined<I: Intersect + ?Sized>(
 ) -> PhotonMap {
     let budget = batch.planned.count();
     let mut map = PhotonMap::default();
-    let resolution = first_resolution(budget, batch.planned.emitter().aspect());
+    let map_of_caster = batch.planned.map();
+    // Of a lattice with a projection map only the cells are traced that may reach the caster.
+    let coverage = map_of_caster.map_or(1.0, ProjectionMap::coverage);
+    let resolution = first_resolution(budget, coverage, batch.planned.emitter().aspect());
     let cells = (0..resolution.y).flat_map(|y| (0..resolution.x).map(move |x| UVec2::new(x, y)));
+    let size = resolution.as_vec2().recip();
+    let cells = cells.filter(|cell| {
+        map_of_caster
+            .is_none_or(|map| map.meets(cell.as_vec2() * size, (cell + 1).as_vec2() * size))
+    });
     let mut level = Level::trace(batch, resolution, cells.collect());
     let mut spent = level.cells.len() as u32;
     progress(spent);
@@ -72,9 +81,11 @@ pub(crate) fn trace_refined<I: Intersect + ?Sized>(
     map
 }
 
-/// Columns and rows of cells as square as can be, in a domain `aspect` times as long as wide.
-fn first_resolution(budget: u32, aspect: f32) -> UVec2 {
-    let cells = (f64::from(budget) * FIRST_SHARE).max(1.0);
+/// Columns and rows of cells as square as can be, in a domain `aspect` times as long as wide of which
+/// the part `coverage` is traced.
+fn first_resolution(budget: u32, coverage: f32, aspect: f32) -> UVec2 {
+    let most = f64::from(u32::MAX / 256);
+    let cells = (f64::from(budget) * FIRST_SHARE / f64::from(coverage)).clamp(1.0, most);
     let columns = (cells * f64::from(aspect)).sqrt().round().clamp(1.0, cells);
     let rows = (cells / columns).floor().max(1.0);
     UVec2::new(columns as u32, rows as u32)
@@ -126,7 +137,10 @@ impl Level {
         cells: Vec<UVec2>,
     ) -> Self {
         let columns = resolution.x;
-        let first = (0..cells.len() as u32).collect();
+        let mut first = vec![NONE; (resolution.x * resolution.y) as usize];
+        for (number, cell) in (0u32..).zip(&cells) {
+            first[(cell.y * columns + cell.x) as usize] = number;
+        }
         let blocks = Blocks {
             columns,
             division: 1,

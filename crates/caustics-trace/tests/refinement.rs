@@ -106,3 +106,57 @@ fn the_same_seed_gives_the_same_photons() {
     assert_eq!(trace(3, 10_000, 5), trace(3, 10_000, 5));
     assert_ne!(trace(3, 10_000, 5), trace(3, 10_000, 6));
 }
+
+#[test]
+fn only_cells_that_may_reach_the_caster_are_refined() {
+    // A slanted mirror, long and narrow, that fills little of the cone around it.
+    let mut scene = Scene::new();
+    let metal = scene.add_material(Material::metal("metal", [0.9; 3]));
+    let white = scene.add_material(Material::diffuse("white", [0.8; 3]));
+    let mut add = |name, corner: [f32; 3], edges: [[f32; 3]; 2], material| {
+        let mesh = caustics_geometry::shapes::quad(corner, edges[0], edges[1]).expect("valid");
+        let mesh = Shape::Mesh(scene.add_mesh(mesh));
+        scene
+            .add_instance(Instance::new(name, mesh, material))
+            .expect("valid");
+    };
+    add(
+        "mirror",
+        [-1.0, 0.2, 0.0],
+        [[2.0, 0.1, 0.0], [0.0, 0.2, 0.02]],
+        metal.expect("valid"),
+    );
+    add(
+        "floor",
+        [-5.0, 0.0, 5.0],
+        [[10.0, 0.0, 0.0], [0.0, 0.0, -10.0]],
+        white.expect("valid"),
+    );
+    let light = Light::point([0.0, 3.0, 1.0], [100.0; 3]).expect("valid");
+    scene.add_light(light).expect("valid");
+    let world = World::new(&scene).expect("valid");
+    let rays = world.intersector(&BvhOptions::default()).expect("valid");
+    let traced = |levels| {
+        let options = TraceOptions {
+            photons: 200_000,
+            refinement: Refinement {
+                levels,
+                ..Refinement::default()
+            },
+            ..TraceOptions::default()
+        };
+        trace_photons(&world, &rays, &options, &|_| {}).expect("valid")
+    };
+    let (even, refined) = (traced(0), traced(2));
+    let emitted = refined.ledger.emitted();
+    assert!(emitted.count <= 200_000, "{}", emitted.count);
+    // Most photons of the cone would miss.
+    let wasted =
+        refined.ledger.entry(Fate::Missed).count + refined.ledger.entry(Fate::Direct).count;
+    assert!(wasted * 2 < emitted.count, "{wasted} of {}", emitted.count);
+    assert!(refined.ledger.imbalance() < 1e-9);
+    let total = emitted.flux.x / even.ledger.emitted().flux.x;
+    assert!((total - 1.0).abs() < 1e-6, "{total}");
+    let landed = stored(&refined.ledger) / stored(&even.ledger);
+    assert!((landed - 1.0).abs() < 0.01, "{landed}");
+}
