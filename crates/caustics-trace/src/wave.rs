@@ -23,8 +23,9 @@ pub(crate) struct Wave<const N: usize> {
     moving: Vec<Branch<N>>,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
-    /// What was stored, for each in the order of landing, and whose part it is.
+    /// What was stored, in the order of landing, with the hash of what its path met.
     landed: Vec<(Photon, u32)>,
+    /// The path that each of these is a part of.
     owners: Vec<usize>,
 }
 
