@@ -28,12 +28,24 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     options.trace.photons = PHOTONS;
     let trace = || trace_photons(&stage.world, &stage.intersector, &options.trace, &|_| {});
     let map = trace()?;
-    let mut plain_options = options.trace;
+    // The check moves photons at the edges of light, and weighs the last one before a silhouette.
+    let mut unchecked_options = options.trace;
+    unchecked_options.check_footprints = false;
+    let trace_unchecked = || {
+        trace_photons(
+            &stage.world,
+            &stage.intersector,
+            &unchecked_options,
+            &|_| {},
+        )
+    };
+    let unchecked = trace_unchecked()?;
+    let mut plain_options = unchecked_options;
     plain_options.differentials = false;
     let trace_plain = || trace_photons(&stage.world, &stage.intersector, &plain_options, &|_| {});
     let plain = trace_plain()?;
-    let is_alike = plain.photons.len() == map.photons.len()
-        && (plain.photons.iter().zip(&map.photons))
+    let is_alike = plain.photons.len() == unchecked.photons.len()
+        && (plain.photons.iter().zip(&unchecked.photons))
             .all(|(one, other)| one.position == other.position && one.flux == other.flux);
     if !is_alike {
         return Err(format!("{name}: photons without differentials land elsewhere").into());
@@ -93,6 +105,9 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     group.throughput(Throughput::Elements(u64::from(PHOTONS)));
     group.bench_function("photons traced", |bencher| {
         bencher.iter(|| black_box(trace()));
+    });
+    group.bench_function("photons traced, footprints unchecked", |bencher| {
+        bencher.iter(|| black_box(trace_unchecked()));
     });
     group.bench_function("photons traced without differentials", |bencher| {
         bencher.iter(|| black_box(trace_plain()));
