@@ -58,7 +58,7 @@ pub struct FootprintOptions {
     /// would be more, one in several of the widest stands for all of them, with their flux: chains
     /// of inner reflections spread a little light over everything, from thousands of photons. It
     /// costs noise where such light is most of what there is. Infinite, the default, keeps all;
-    /// [`render`](crate::render()) keeps to 128 for what is seen through glass and in mirrors.
+    /// [`render`](crate::render()) keeps to 512 for what is seen through glass and in mirrors.
     /// Splats draw all of them in any case.
     pub max_overlaps: f32,
     /// Whether a splat integrates footprints as small as pixels over each pixel, for the Gaussian

@@ -19,7 +19,11 @@ use crate::splat::splat;
 const MAX_SIZE: u32 = 32_768;
 
 /// In how many footprints a point seen through glass or in a mirror lies, on the mean, at most.
-const OVERLAPS: f32 = 128.0;
+///
+/// With 128 the public scene of a glass ball has 1.4 times the relMSE at 262,144 photons, that of a
+/// glass block 1.8 times, for a tenth less time; with 2048 both have 0.95 times and take 1.6 and 2.6
+/// times as long.
+const OVERLAPS: f32 = 512.0;
 
 /// Through what the camera may see a caustic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
