@@ -14,7 +14,8 @@ use crate::splat_level::{Level, margin};
 use crate::surroundings::Surroundings;
 use crate::truncated_kernel::TruncatedKernel;
 
-/// Photons that are prepared at a time, to bound the memory.
+/// Photons that are prepared at a time: few enough that what is ready stays in the caches until every
+/// band of rows has drawn it.
 const BATCH: usize = 1 << 14;
 
 /// Pixels a side of a level's pixel on the level below.
