@@ -92,7 +92,7 @@ impl<'a> Report<'a> {
             "energy": {
                 "emitted": entry(ledger.emitted()),
                 "roulette_gain": ledger.roulette_gain().to_array(),
-                "silhouette_gain": ledger.silhouette_gain.to_array(),
+                "edge_gain": ledger.edge_gain.to_array(),
                 "fates": fates,
                 "imbalance": ledger.imbalance(),
             },

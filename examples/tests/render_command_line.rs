@@ -439,7 +439,7 @@ fn statistics_have_their_documented_keys_and_balance() -> TestResult {
     let fates = energy["fates"].as_object().ok_or("no fates")?;
     let out = fates.values().map(red).sum::<Result<f64, _>>()?;
     let gain = energy["roulette_gain"][0].as_f64().ok_or("no gain")?;
-    let weighed = energy["silhouette_gain"][0].as_f64().ok_or("no gain")?;
+    let weighed = energy["edge_gain"][0].as_f64().ok_or("no gain")?;
     let in_all = red(&energy["emitted"])? + gain + weighed;
     assert!(
         in_all > 0.0 && (out / in_all - 1.0).abs() < 1e-4,

@@ -122,10 +122,12 @@ pub struct EnergyLedger {
     pub bounded_differentials: u64,
     /// Footprints that were taken from a neighbour's landing because their differential was longer.
     pub replaced_differentials: u64,
-    /// What the photons at silhouettes carry more than their paths brought them, or less where it is
-    /// negative, in watts: each stands for the light from the silhouette on, of which its row of the
-    /// lattice may have more or less than a cell. It is part of what is [`Fate::Stored`].
-    pub silhouette_gain: DVec3,
+    /// Photons at the ends of a lattice's rows that were divided, each in place of one.
+    pub divided_photons: u64,
+    /// What the photons at the edges of sheets of light carry more than their paths brought them, or
+    /// less where it is negative, in watts: each stands for the light up to the edge, of which its row
+    /// of the lattice may have more or less than a cell. It is part of what is [`Fate::Stored`].
+    pub edge_gain: DVec3,
     /// Rays traced, shadow rays not among them.
     pub rays: u64,
 }
@@ -159,7 +161,7 @@ impl EnergyLedger {
     /// relative to the brightest channel of what came in; 0 when nothing was emitted.
     #[must_use]
     pub fn imbalance(&self) -> f64 {
-        let incoming = self.emitted.flux + self.roulette_gain + self.silhouette_gain;
+        let incoming = self.emitted.flux + self.roulette_gain + self.edge_gain;
         let scale = incoming.max_element();
         if scale <= 0.0 {
             return 0.0;
@@ -186,6 +188,14 @@ impl EnergyLedger {
     /// Books flux that a surviving path was given.
     pub fn gain(&mut self, flux: Vec3) {
         self.roulette_gain += flux.as_dvec3();
+    }
+
+    /// Adds photons at edges to those that are stored, with the flux in watts that all have more.
+    pub(crate) fn gain_at_edges(&mut self, photons: u64, flux: DVec3) {
+        self.edge_gain += flux;
+        let stored = &mut self.fates[Fate::Stored as usize];
+        stored.count += photons;
+        stored.flux += flux;
     }
 
     /// Adds flux to photons that are stored, in watts.
@@ -247,7 +257,8 @@ impl EnergyLedger {
         self.replaced_differentials = self
             .replaced_differentials
             .saturating_sub(other.replaced_differentials);
-        self.silhouette_gain -= other.silhouette_gain;
+        self.divided_photons = self.divided_photons.saturating_sub(other.divided_photons);
+        self.edge_gain -= other.edge_gain;
         self.bounded_differentials = self
             .bounded_differentials
             .saturating_sub(other.bounded_differentials);
@@ -275,7 +286,8 @@ impl EnergyLedger {
         self.normal_fallbacks += other.normal_fallbacks;
         self.bounded_differentials += other.bounded_differentials;
         self.replaced_differentials += other.replaced_differentials;
-        self.silhouette_gain += other.silhouette_gain;
+        self.divided_photons += other.divided_photons;
+        self.edge_gain += other.edge_gain;
         self.rays += other.rays;
     }
 }

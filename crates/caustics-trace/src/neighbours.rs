@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::lattice::Lattice;
@@ -10,7 +12,7 @@ use crate::silhouette::Silhouette;
 /// that shrinks with the spacing. Just inside a silhouette light turns with the square root of the
 /// distance to it, whose derivative has no bound: the first photon inside, wherever it may stand in
 /// its cell, lands at most twice the cell's mean from its neighbour.
-const LIMIT: f32 = 1.5;
+pub(crate) const LIMIT: f32 = 1.5;
 
 /// At an edge of a sheet of light, how far inwards the footprint's middle is moved and by what its
 /// axis is shortened, in its length.
@@ -20,8 +22,8 @@ const LIMIT: f32 = 1.5;
 /// has its mean at 0.108 and 0.78 times that deviation; a shift of 0.15 and an axis of 0.6 let still
 /// less light out, and leave a ridge. These lie between. At 131,072 photons they have less than half
 /// the error of none at all where the light of a mirror ring or of a cube's face ends in the dark.
-const EDGE_SHIFT: f32 = 0.13;
-const EDGE_EXTENT: f32 = 0.69;
+pub(crate) const EDGE_SHIFT: f32 = 0.13;
+pub(crate) const EDGE_EXTENT: f32 = 0.69;
 
 /// The largest ratio of a differential to the distance of a neighbour that is told from a larger
 /// one.
@@ -42,8 +44,7 @@ impl LatticePhotons<'_> {
     /// path landed.
     pub(crate) fn checked(&self, point: u32) -> impl Iterator<Item = CheckedFootprint> + '_ {
         let neighbours = self.lattice.neighbours(point);
-        let own = self.starts[point as usize]..self.starts[point as usize + 1];
-        own.map(move |index| {
+        self.photons_of(point).map(move |index| {
             let photon = &self.photons[index];
             if photon.source == FootprintSource::Thinned {
                 return checked(photon, &[[None; 2]; 2]);
@@ -54,8 +55,21 @@ impl LatticePhotons<'_> {
         })
     }
 
-    fn photon_of(&self, point: u32, path: u32) -> Option<&Photon> {
-        let range = self.starts[point as usize]..self.starts[point as usize + 1];
+    /// The photons of one point with checked footprints.
+    pub(crate) fn checked_photons(&self, point: u32) -> impl Iterator<Item = Photon> + '_ {
+        let own = self.photons[self.photons_of(point)].iter();
+        own.zip(self.checked(point))
+            .map(|(photon, footprint)| footprint.of(photon))
+    }
+
+    /// Where the photons of a point are.
+    pub(crate) fn photons_of(&self, point: u32) -> Range<usize> {
+        self.starts[point as usize]..self.starts[point as usize + 1]
+    }
+
+    /// The photon of a point that took a path.
+    pub(crate) fn photon_of(&self, point: u32, path: u32) -> Option<&Photon> {
+        let range = self.photons_of(point);
         let found = self.paths[range.clone()]
             .iter()
             .position(|&it| it == path)?;
@@ -72,6 +86,19 @@ pub(crate) struct CheckedFootprint {
     /// leaves the last cell a part of its light, or adds what falls into the next.
     pub(crate) cells: f32,
     pub(crate) source: FootprintSource,
+}
+
+impl CheckedFootprint {
+    /// The photon that has it.
+    pub(crate) fn of(self, photon: &Photon) -> Photon {
+        Photon {
+            position: self.position,
+            flux: self.cells * photon.flux,
+            axes: self.axes,
+            source: self.source,
+            ..*photon
+        }
+    }
 }
 
 /// What the neighbours along an axis say.

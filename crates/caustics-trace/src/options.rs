@@ -64,6 +64,12 @@ pub struct TraceOptions {
     /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
     /// those are nearer, and drawn in at the edges of sheets of light.
     pub check_footprints: bool,
+    /// Whether the last photons of a lattice's rows are divided, where a sheet of light ends: a few more
+    /// rays find where, and what of the cell is left is traced in parts. Edges become sharp and stand
+    /// where they are, and light that lands near a silhouette is as bright as it is, at a tenth to a
+    /// third more rays. It needs [`check_footprints`](Self::check_footprints) and
+    /// [`Branching::SplitAll`], and does nothing without.
+    pub divide_edges: bool,
     /// Whether photons carry differentials. Without, their footprints have no axes: enough for
     /// estimates from the nearest photons, at less time.
     pub differentials: bool,
@@ -110,6 +116,7 @@ impl Default for TraceOptions {
             sequence: Sequence::Grid,
             refinement: Refinement::default(),
             check_footprints: true,
+            divide_edges: true,
             differentials: true,
             culling: Culling::default(),
         }

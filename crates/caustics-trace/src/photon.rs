@@ -45,16 +45,22 @@ pub enum FootprintSource {
     /// From its ray differential, widened for the paths that ended by Russian roulette where this
     /// one went on.
     Thinned,
+    /// From the ray differential of a part of its cell, or the finite difference to the part beside
+    /// it: a sheet of light ends there ([`TraceOptions::divide_edges`]).
+    ///
+    /// [`TraceOptions::divide_edges`]: crate::TraceOptions::divide_edges
+    Divided,
 }
 
 impl FootprintSource {
     /// All sources.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Differential,
         Self::Checked,
         Self::Bounded,
         Self::Neighbour,
         Self::Thinned,
+        Self::Divided,
     ];
 }
 

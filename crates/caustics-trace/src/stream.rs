@@ -94,7 +94,7 @@ impl PhotonStream {
             self.window
                 .append(batch.traced(self.traced..until, &|_| {}));
             self.traced = until;
-            self.give(&mut map, planned, options);
+            self.give(&mut map, &batch);
             if self.traced < planned.count() {
                 break;
             }
@@ -124,7 +124,10 @@ impl PhotonStream {
     }
 
     /// Moves to the map what is settled.
-    fn give(&mut self, map: &mut PhotonMap, planned: &EmissionBatch, options: &TraceOptions) {
+    fn give<I: Intersect + ?Sized>(&mut self, map: &mut PhotonMap, batch: &Batch<'_, I>) {
+        let Batch {
+            planned, options, ..
+        } = *batch;
         let (mut settled, needed);
         if Traced::are_checked(options, planned) {
             let lattice = planned.lattice();
@@ -132,7 +135,7 @@ impl PhotonStream {
             (points, needed) = lattice.settled(self.traced);
             let window = lattice.window(self.first..self.traced);
             let range = self.given - self.first..points - self.first;
-            settled = self.window.checked(&window, range);
+            settled = batch.checked(&mut self.window, &window, range);
             self.given = points;
         } else {
             settled = std::mem::take(&mut self.window.photons);

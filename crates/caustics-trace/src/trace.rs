@@ -1,11 +1,15 @@
+use std::ops::Range;
+
 use caustics_accel::Intersect;
 use caustics_sampling::{CounterRng, Sequence};
 use caustics_scene::World;
 use glam::DVec3;
 
+use crate::edges::EdgeTracer;
 use crate::emission::{Emission, EmissionSample};
+use crate::lattice::Lattice;
 use crate::ledger::{EnergyLedger, Fate};
-use crate::options::{TraceError, TraceOptions};
+use crate::options::{Branching, TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
 use crate::plan::{EmissionBatch, EmissionPlan};
 use crate::refine::trace_refined;
@@ -97,7 +101,7 @@ pub fn trace_part<I: Intersect + ?Sized>(
     intersect: &I,
     plan: &EmissionPlan,
     options: &TraceOptions,
-    photons: std::ops::Range<u32>,
+    photons: Range<u32>,
 ) -> Result<PhotonMap, TraceError> {
     options.validate()?;
     let mut map = PhotonMap::default();
@@ -208,7 +212,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
 
     fn trace_chunks<const N: usize>(
         &self,
-        photons: std::ops::Range<u32>,
+        photons: Range<u32>,
         progress: &(dyn Fn(u32) + Sync),
     ) -> Traced {
         let chunks = (photons.len() as u32).div_ceil(CHUNK);
@@ -232,11 +236,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     }
 
     /// Traces the photons with these numbers, on all threads.
-    pub(crate) fn traced(
-        &self,
-        photons: std::ops::Range<u32>,
-        progress: &(dyn Fn(u32) + Sync),
-    ) -> Traced {
+    pub(crate) fn traced(&self, photons: Range<u32>, progress: &(dyn Fn(u32) + Sync)) -> Traced {
         if !self.options.differentials {
             self.trace_chunks::<0>(photons, progress)
         } else if self.planned.emitter().dimensions() == 2 {
@@ -247,21 +247,62 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     }
 
     /// The same, checked as far as all neighbours are among them, and culled.
-    fn trace(
-        &self,
-        map: &mut PhotonMap,
-        photons: std::ops::Range<u32>,
-        progress: &(dyn Fn(u32) + Sync),
-    ) {
+    fn trace(&self, map: &mut PhotonMap, photons: Range<u32>, progress: &(dyn Fn(u32) + Sync)) {
         let mut all = self.traced(photons, progress);
-        all.check_footprints(self.options, self.planned);
+        let is_whole = all.starts.len() == self.planned.count() as usize;
+        if is_whole && Traced::are_checked(self.options, self.planned) {
+            all.photons = self.checked(&mut all, self.planned.lattice(), 0..self.planned.count());
+        }
         let culling = &self.options.culling;
         culling.apply(&mut all.photons, &mut all.ledger);
         map.photons.append(&mut all.photons);
         map.ledger.merge(&all.ledger);
     }
 
-    fn trace_range<const N: usize>(&self, range: std::ops::Range<u32>) -> Traced {
+    /// Those of `traced` that come from some points, with checked footprints and divided at edges as
+    /// far as is asked for; `lattice` has all points that there are photons of there.
+    pub(crate) fn checked(
+        &self,
+        traced: &mut Traced,
+        lattice: &Lattice,
+        points: Range<u32>,
+    ) -> Vec<Photon> {
+        if !self.options.divide_edges || self.options.branching != Branching::SplitAll {
+            return traced.checked(lattice, points);
+        }
+        let chunks = (points.len() as u32).div_ceil(CHUNK);
+        let parts: Vec<(Vec<Photon>, EnergyLedger)> = traced.with_neighbours(lattice, |photons| {
+            let check = |edges: &mut EdgeTracer<'_, '_, I>, chunk: u32| {
+                let start = points.start + chunk * CHUNK;
+                let mut checked = Vec::new();
+                for point in start..points.end.min(start.saturating_add(CHUNK)) {
+                    edges.photons(photons, point, &mut checked);
+                }
+                (checked, edges.take_ledger())
+            };
+            #[cfg(feature = "parallel")]
+            let parts = {
+                use rayon::prelude::*;
+                let chunks = (0..chunks).into_par_iter();
+                chunks.map_init(|| EdgeTracer::new(self), check).collect()
+            };
+            #[cfg(not(feature = "parallel"))]
+            let parts = {
+                let mut edges = EdgeTracer::new(self);
+                (0..chunks).map(|it| check(&mut edges, it)).collect()
+            };
+            parts
+        });
+        let mut checked = Vec::with_capacity(parts.iter().map(|(it, _)| it.len()).sum());
+        for (mut photons, ledger) in parts {
+            checked.append(&mut photons);
+            traced.ledger.merge(&ledger);
+        }
+        traced.book_edges(points, &checked);
+        checked
+    }
+
+    fn trace_range<const N: usize>(&self, range: Range<u32>) -> Traced {
         let mut tracer = self.tracer::<N>();
         let mut starts = Vec::with_capacity(range.len());
         let mut wave = Wave::new();

@@ -1,4 +1,7 @@
+use std::ops::Range;
+
 use caustics_sampling::Sequence;
+use glam::DVec3;
 
 use crate::lattice::Lattice;
 use crate::ledger::EnergyLedger;
@@ -72,58 +75,65 @@ impl Traced {
     pub(crate) fn check_footprints(&mut self, options: &TraceOptions, planned: &EmissionBatch) {
         let count = planned.count();
         if Self::are_checked(options, planned) && self.starts.len() == count as usize {
-            let before = self.ledger.silhouette_gain;
             self.photons = self.checked(planned.lattice(), 0..count);
-            let gain = self.ledger.silhouette_gain - before;
-            self.ledger.strengthen(gain);
         }
     }
 
     /// The photons of some points with checked footprints; `lattice` has all points that there are
-    /// photons of here. Those that are booked as stored are so with the flux that they had before.
-    pub(crate) fn checked(
+    /// photons of here.
+    pub(crate) fn checked(&mut self, lattice: &Lattice, points: Range<u32>) -> Vec<Photon> {
+        let checked = self.with_neighbours(lattice, |photons| {
+            #[cfg(feature = "parallel")]
+            let checked: Vec<Photon> = {
+                use rayon::prelude::*;
+                let points = points.clone().into_par_iter().with_min_len(1024);
+                points
+                    .flat_map_iter(|it| photons.checked_photons(it))
+                    .collect()
+            };
+            #[cfg(not(feature = "parallel"))]
+            let checked: Vec<Photon> = points
+                .clone()
+                .flat_map(|it| photons.checked_photons(it))
+                .collect();
+            checked
+        });
+        let replaced = checked.iter().map(|it| it.source);
+        let replaced = replaced.filter(|it| *it == FootprintSource::Neighbour);
+        self.ledger.replaced_differentials += replaced.count() as u64;
+        self.book_edges(points, &checked);
+        checked
+    }
+
+    /// These photons, in the order of a lattice that has all points that there are photons of here.
+    pub(crate) fn with_neighbours<T>(
         &mut self,
         lattice: &Lattice,
-        points: std::ops::Range<u32>,
-    ) -> Vec<Photon> {
+        look: impl FnOnce(&LatticePhotons<'_>) -> T,
+    ) -> T {
         self.starts.push(self.photons.len());
-        let first = self.starts[points.start as usize];
-        let photons = LatticePhotons {
+        let result = look(&LatticePhotons {
             lattice,
             photons: &self.photons,
             paths: &self.paths,
             starts: &self.starts,
-        };
-        let of_point = |point: u32| {
-            let own = self.starts[point as usize]..self.starts[point as usize + 1];
-            let own = self.photons[own].iter();
-            own.zip(photons.checked(point))
-                .map(|(photon, footprint)| Photon {
-                    position: footprint.position,
-                    flux: footprint.cells * photon.flux,
-                    axes: footprint.axes,
-                    source: footprint.source,
-                    ..*photon
-                })
-        };
-        #[cfg(feature = "parallel")]
-        let checked: Vec<Photon> = {
-            use rayon::prelude::*;
-            points
-                .into_par_iter()
-                .with_min_len(1024)
-                .flat_map_iter(of_point)
-                .collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let checked: Vec<Photon> = points.flat_map(of_point).collect();
+        });
         self.starts.pop();
-        for (before, after) in self.photons[first..].iter().zip(&checked) {
-            let gain = after.flux.as_dvec3() - before.flux.as_dvec3();
-            self.ledger.silhouette_gain += gain;
-            let is_replaced = after.source == FootprintSource::Neighbour;
-            self.ledger.replaced_differentials += u64::from(is_replaced);
-        }
-        checked
+        result
+    }
+
+    /// Books what the photons of some points have more, now that they are checked.
+    pub(crate) fn book_edges(&mut self, points: Range<u32>, checked: &[Photon]) {
+        let place = |point: u32| {
+            let start = self.starts.get(point as usize).copied();
+            start.unwrap_or(self.photons.len())
+        };
+        let before = &self.photons[place(points.start)..place(points.end)];
+        let flux = |photons: &[Photon]| -> DVec3 {
+            photons.iter().map(|photon| photon.flux.as_dvec3()).sum()
+        };
+        let gain = flux(checked) - flux(before);
+        let more = checked.len() as u64 - before.len() as u64;
+        self.ledger.gain_at_edges(more, gain);
     }
 }

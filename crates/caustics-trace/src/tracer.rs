@@ -11,6 +11,7 @@ use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::optics::beer_lambert;
 use crate::options::{Branching, TraceOptions};
+use crate::path_guide::{PathGuide, extended};
 use crate::photon::{FootprintSource, Photon};
 use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
@@ -57,6 +58,8 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     earlier: &'a [EmissionBatch],
     /// Where the paths go, if that is asked for.
     pub(crate) trail: Option<Trail<'a>>,
+    /// Which branches are followed; all without one.
+    pub(crate) guide: Option<PathGuide>,
 }
 
 impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
@@ -72,6 +75,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             caster: None,
             earlier: &[],
             trail: None,
+            guide: None,
         }
     }
 
@@ -189,7 +193,9 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
                 part.flux = Vec3::ZERO;
                 part.flux[channel] = branch.flux[channel];
                 part.channel = Some(channel as u8);
-                if part.flux == Vec3::ZERO {
+                // Each colour is a sheet of light of its own.
+                part.path = extended(branch.path, channel as u32, 0);
+                if part.flux == Vec3::ZERO || !self.admits(part.path, branch.path) {
                     continue;
                 }
             }
@@ -219,6 +225,12 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             Some(met) => met != caster,
             None => self.earlier.iter().any(|it| it.covers(ray)),
         }
+    }
+
+    fn admits(&mut self, path: u32, before: u32) -> bool {
+        self.guide
+            .as_mut()
+            .is_none_or(|guide| guide.admits(path, before))
     }
 
     fn disperses(&self, point: &SurfacePoint) -> bool {
@@ -323,6 +335,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         if strongest <= 0.0 {
             return;
         }
+        let path = extended(branch.path, point.object, 1 + outgoing.event as u32);
+        if !self.admits(path, branch.path) {
+            return;
+        }
         let mut flux = flux;
         if strongest < threshold {
             let survival = strongest / threshold;
@@ -362,7 +378,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: branch.events + u32::from(outgoing.event != Event::Passage),
             has_split: event.has_split,
             channel: branch.channel,
-            path: extended(branch.path, point.object, 1 + outgoing.event as u32),
+            path,
             source,
         });
     }
@@ -418,14 +434,4 @@ impl<const N: usize> SpecularEvent<'_, N> {
             ),
         }
     }
-}
-
-/// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
-/// whole words).
-fn extended(path: u32, object: u32, event: u32) -> u32 {
-    let word = object
-        .wrapping_mul(4)
-        .wrapping_add(event)
-        .wrapping_add(0x9E37_79B9);
-    (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
 }

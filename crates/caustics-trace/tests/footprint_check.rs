@@ -79,7 +79,7 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
     assert!(replaced > 100, "{replaced}");
     assert!(moved > 100, "{moved}");
     assert!(weighed > 100, "{weighed}");
-    assert!((gain - checked.ledger.silhouette_gain).length() < 1e-12);
+    assert!((gain - checked.ledger.edge_gain).length() < 1e-12);
     // Some get more and some get less; here, where all rows end alike, mostly less.
     let stored = checked.ledger.entry(Fate::Stored).flux;
     assert!(gain.length() < 3e-3 * stored.length(), "{gain} of {stored}");

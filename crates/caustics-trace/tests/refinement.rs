@@ -73,7 +73,7 @@ fn energy_balances_and_is_that_of_an_even_lattice() {
         let total = refined.ledger.emitted().flux.x / even.ledger.emitted().flux.x;
         assert!((total - 1.0).abs() < 1e-6, "{total}");
         // What paths brought: refined lattices have no neighbours that tell silhouettes.
-        let brought = stored(&even.ledger) - even.ledger.silhouette_gain.x;
+        let brought = stored(&even.ledger) - even.ledger.edge_gain.x;
         let caustic = stored(&refined.ledger) / brought;
         assert!((caustic - 1.0).abs() < 2e-3, "{caustic}");
         let photons: f64 = refined.photons.iter().map(|it| f64::from(it.flux.x)).sum();

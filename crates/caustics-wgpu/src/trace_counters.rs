@@ -82,7 +82,7 @@ impl TraceCounters {
         let overlap = ledger.entry(Fate::Overlap).flux;
         ledger.emit_unaimed(plan.power() - (emitted.flux - overlap));
         let gain = entry(Self::SILHOUETTE_GAIN).flux - entry(Self::SILHOUETTE_LOSS).flux;
-        ledger.silhouette_gain = gain;
+        ledger.edge_gain = gain;
         ledger.add(
             Fate::Stored,
             &LedgerEntry {

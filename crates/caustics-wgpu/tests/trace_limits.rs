@@ -123,7 +123,7 @@ fn what_has_no_room_is_counted() {
     assert_eq!((crowded.stored, whole.crowded.count), (100, 0));
     assert_eq!(crowded.crowded.count, u64::from(whole.stored) - 100);
     let ledger = &crowded.ledger;
-    let incoming = ledger.emitted().flux + ledger.roulette_gain() + ledger.silhouette_gain;
+    let incoming = ledger.emitted().flux + ledger.roulette_gain() + ledger.edge_gain;
     let missing = incoming - ledger.accounted();
     assert!((missing - crowded.crowded.flux).abs().max_element() < 1e-6);
     assert!(crowded.crowded.flux.min_element() > 0.0);

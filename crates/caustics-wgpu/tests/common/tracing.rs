@@ -71,7 +71,7 @@ pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<Photon
             let checked = checked.next().unwrap();
             assert_eq!(photon.incoming, checked.incoming);
             let gain = checked.flux.as_dvec3() - photon.flux.as_dvec3();
-            trail.ledger.silhouette_gain += gain;
+            trail.ledger.edge_gain += gain;
             let stored = LedgerEntry {
                 count: 0,
                 flux: gain,
@@ -308,7 +308,7 @@ pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -
     let lines = Fate::ALL.into_iter().filter(unlike);
     let lines =
         lines.map(|fate| format!("{}: {:?}, {:?}", fate.name(), a.entry(fate), b.entry(fate)));
-    let gains = [a, b].map(|it| it.silhouette_gain);
+    let gains = [a, b].map(|it| it.edge_gain);
     let gained = (gains[0] - gains[1]).abs().max_element() > 1e-4 * emitted;
     let gained = gained.then(|| format!("silhouettes: {gains:?}"));
     let counts = [

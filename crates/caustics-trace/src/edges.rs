@@ -1,0 +1,338 @@
+use caustics_accel::Intersect;
+use glam::{Vec2, Vec3};
+
+use crate::emission::EmissionSample;
+use crate::ledger::EnergyLedger;
+use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons};
+use crate::path_guide::PathGuide;
+use crate::photon::{FootprintSource, Photon};
+use crate::silhouette::Silhouette;
+use crate::trace::Batch;
+use crate::tracer::PathTracer;
+
+fn env(name: &str, or: f32) -> f32 {
+    std::env::var(name)
+        .ok()
+        .and_then(|it| it.parse().ok())
+        .unwrap_or(or)
+}
+
+/// How often the stretch in which a row's end lies is halved: it is known to a sixteenth of a cell
+/// then, which is the most that the narrowest stratum can do with.
+const HALVINGS: u32 = 3;
+
+/// The strata that the light of a row's last photon is divided into, from the inside to the edge, in
+/// parts of it. In steps of two, since the sum of footprints is uneven where their widths differ by
+/// more.
+const STRATA: [(f32, f32); 3] = [(0.0, 0.5), (0.5, 0.75), (0.75, 1.0)];
+
+/// Photons with less than this part of the flux of their cell's brightest are not divided.
+const SIGNIFICANT: f32 = 0.1;
+
+/// The last photons of a lattice's rows, divided.
+///
+/// A sheet of light, the photons of one path, ends somewhere between the last point of a row that has
+/// it and the next, which has not. Nobody knows where, so that as many cells' light is drawn as there
+/// are points, with a jagged edge; and where the sheet ends at a silhouette, Fresnel's terms and the
+/// place of landing change within that last cell as much as over many others. Both are found by a few
+/// more rays. The end is found by halving; what lies between it and the cell's inner side is divided
+/// into strata, each of which is traced as a photon of its own, with a footprint as wide as it is. How
+/// the end runs from row to row, half a row on, gives the slant of the strata.
+///
+/// Cells at edges are few: of N cells as many as the root of N, so that all this costs less the more
+/// photons there are.
+pub(crate) struct EdgeTracer<'a, 'b, I: ?Sized> {
+    batch: &'b Batch<'a, I>,
+    tracer: PathTracer<'a, I, 2>,
+    /// Of what has been counted since it was taken.
+    ledger: EnergyLedger,
+}
+
+/// A point of the lattice, the path of one of its photons, and the axis along which that path ends.
+#[derive(Clone, Copy)]
+struct Row {
+    /// Number of the point in the whole lattice.
+    number: u32,
+    path: u32,
+    axis: usize,
+    /// Whether it ends towards larger or smaller coordinates.
+    sign: f32,
+}
+
+impl Row {
+    /// What is `along` cells from the point towards the end, and `across` cells beside the row.
+    fn offset(&self, along: f32, across: f32) -> Vec2 {
+        let mut offset = Vec2::splat(across);
+        offset[self.axis] = self.sign * along;
+        offset
+    }
+}
+
+impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
+    pub(crate) fn new(batch: &'b Batch<'a, I>) -> Self {
+        let mut tracer = batch.tracer();
+        tracer.guide = Some(PathGuide::default());
+        Self {
+            batch,
+            tracer,
+            ledger: EnergyLedger::default(),
+        }
+    }
+
+    /// What has been counted since the last time: rays, photons divided and footprints replaced.
+    pub(crate) fn take_ledger(&mut self) -> EnergyLedger {
+        self.ledger.rays = std::mem::take(&mut self.tracer.ledger).rays;
+        std::mem::take(&mut self.ledger)
+    }
+
+    /// The photons of one point, with checked footprints; those at the end of a row are divided.
+    pub(crate) fn photons(
+        &mut self,
+        lattice: &LatticePhotons<'_>,
+        point: u32,
+        checked: &mut Vec<Photon>,
+    ) {
+        let own = lattice.photons_of(point);
+        let flux = |photon: &Photon| photon.flux.max_element();
+        let brightest = lattice.photons[own.clone()].iter().map(flux);
+        let brightest = brightest.fold(0.0, f32::max);
+        let neighbours = lattice.lattice.neighbours(point);
+        for (index, footprint) in own.zip(lattice.checked(point)) {
+            let photon = &lattice.photons[index];
+            let is_worth_it = photon.source != FootprintSource::Thinned
+                && flux(photon) >= env("SIGNIF", SIGNIFICANT) * brightest;
+            let path = lattice.paths[index];
+            let landed = neighbours.map(|pair| pair.map(|at| lattice.photon_of(at?, path)));
+            let number = lattice.lattice.number(point);
+            if is_worth_it && self.divide(photon, number, path, &landed, checked) {
+                self.ledger.divided_photons += 1;
+            } else {
+                let is_replaced = footprint.source == FootprintSource::Neighbour;
+                self.ledger.replaced_differentials += u64::from(is_replaced);
+                checked.push(footprint.of(photon));
+            }
+        }
+    }
+
+    /// Divides a photon, if its path ends beside it and goes on behind it.
+    fn divide(
+        &mut self,
+        photon: &Photon,
+        number: u32,
+        path: u32,
+        landed: &[[Option<&Photon>; 2]; 2],
+        divided: &mut Vec<Photon>,
+    ) -> bool {
+        let mut nearest: Option<(Row, f32)> = None;
+        let mut ends = 0;
+        let mut inner = photon;
+        for (axis, pair) in landed.iter().enumerate() {
+            let (sign, before) = match pair {
+                [Some(before), None] => (1.0, before),
+                [None, Some(before)] => (-1.0, before),
+                _ => continue,
+            };
+            if before.object != photon.object || !self.knows(number, path) {
+                continue;
+            }
+            let row = Row {
+                number,
+                path,
+                axis,
+                sign,
+            };
+            let reach = self.end(&row, 0.0, 0.0);
+            ends += 1;
+            // The axis that crosses the edge the more steeply.
+            if nearest.is_none_or(|(_, least)| reach < least) {
+                nearest = Some((row, reach));
+                inner = before;
+            }
+        }
+        let Some((row, reach)) = nearest else {
+            return false;
+        };
+        let slant = if env("SLANT", 1.0) > 0.0 {
+            2.0 * row.sign * (self.end(&row, 0.5, reach - 0.5) - reach)
+        } else {
+            0.0
+        };
+        let cells = 0.5 + reach;
+        let strata = STRATA.map(|(low, high)| {
+            let at = 0.5 * (low + high) * cells - 0.5;
+            let photon = self.photon_at(&row, row.offset(at, 0.0))?;
+            Some(Stratum {
+                photon,
+                at,
+                width: (high - low) * cells,
+                slant: 0.5 * (low + high) * slant,
+            })
+        });
+        let [Some(first), Some(second), Some(last)] = strata else {
+            return false;
+        };
+        let across = 1 - row.axis;
+        // Along the edge the photon's neighbours may have landed nearer than its differential says.
+        let narrowing = if ends == 1 {
+            checked_ratio(photon, across, &landed[across])
+        } else {
+            1.0
+        };
+        let before = Stratum {
+            photon: *inner,
+            at: -1.0,
+            ..first
+        };
+        let edge = Edge {
+            axis: row.axis,
+            sign: row.sign,
+            narrowing,
+        };
+        divided.extend([
+            edge.footprint(&first, &before, Some(&second)),
+            edge.footprint(&second, &first, Some(&last)),
+            edge.footprint(&last, &second, None),
+        ]);
+        true
+    }
+
+    /// Makes sure that the way of a path is known.
+    fn knows(&mut self, number: u32, path: u32) -> bool {
+        let Some(guide) = &mut self.tracer.guide else {
+            return false;
+        };
+        if guide.follow(path) {
+            return true;
+        }
+        guide.follow_all();
+        self.send(number, Vec2::ZERO);
+        self.tracer
+            .guide
+            .as_mut()
+            .is_some_and(|guide| guide.follow(path))
+    }
+
+    /// How far a row goes, `across` cells beside it, in cells from its point: somewhere in the cell
+    /// that begins `from` there.
+    fn end(&mut self, row: &Row, across: f32, from: f32) -> f32 {
+        let mut width = 0.5;
+        let mut at = from;
+        for _ in 0..env("HALV", HALVINGS as f32) as u32 {
+            if self
+                .photon_at(row, row.offset(at + width, across))
+                .is_some()
+            {
+                at += width;
+            }
+            width *= 0.5;
+        }
+        at + width
+    }
+
+    /// The photon of the row's path that is sent from beside its point.
+    fn photon_at(&mut self, row: &Row, offset: Vec2) -> Option<Photon> {
+        self.send(row.number, offset);
+        let found = self.tracer.paths.iter().position(|&it| it == row.path)?;
+        Some(self.tracer.photons[found])
+    }
+
+    /// Traces what is sent from beside a point, in cells from it.
+    fn send(&mut self, number: u32, offset: Vec2) {
+        self.tracer.photons.clear();
+        self.tracer.paths.clear();
+        let planned = self.batch.planned;
+        let mut sample = EmissionSample::without_place(planned.points(), number);
+        sample.point += offset.x * sample.spacing[0] + offset.y * sample.spacing[1];
+        let is_sent = sample.point.cmpge(Vec2::ZERO).all() && sample.point.cmplt(Vec2::ONE).all();
+        let emitter = planned.emitter();
+        let emission = is_sent.then(|| emitter.emit::<2>(self.batch.world, &sample));
+        if let Some(emission) = emission.flatten() {
+            let mut random = planned.random(self.batch.options.seed, u64::from(number));
+            self.tracer.trace(&emission, planned.media(), &mut random);
+        }
+    }
+}
+
+/// How many times as long as its axis a photon's neighbours let its footprint be, at most once.
+fn checked_ratio(photon: &Photon, axis: usize, pair: &[Option<&Photon>; 2]) -> f32 {
+    let neighbours = pair.iter().flatten();
+    let same = neighbours.filter(|it| it.object == photon.object);
+    let farthest = same
+        .map(|it| in_plane(photon, it).length())
+        .reduce(f32::max);
+    let length = photon.axes[axis].length();
+    match farthest {
+        Some(farthest) if length > LIMIT * farthest => farthest / length,
+        _ => 1.0,
+    }
+}
+
+/// From where a photon landed to where another did, in its receiver's plane.
+fn in_plane(photon: &Photon, other: &Photon) -> Vec3 {
+    let displacement = other.position - photon.position;
+    displacement - photon.normal * displacement.dot(photon.normal)
+}
+
+/// A part of the light of a row's last photon.
+#[derive(Clone, Copy)]
+struct Stratum {
+    /// As if it stood for a whole cell.
+    photon: Photon,
+    /// Its middle, in cells from the point towards the edge.
+    at: f32,
+    /// In cells.
+    width: f32,
+    /// How far it leads along the row from one row to the next, in cells.
+    slant: f32,
+}
+
+/// An edge beside a point of a lattice.
+struct Edge {
+    /// Of the lattice, the axis of the rows that end there.
+    axis: usize,
+    /// Whether towards larger or smaller coordinates.
+    sign: f32,
+    /// By what axes along the edge are shortened.
+    narrowing: f32,
+}
+
+impl Edge {
+    /// The photon of a stratum, by those before and after it.
+    fn footprint(&self, own: &Stratum, before: &Stratum, after: Option<&Stratum>) -> Photon {
+        let mut photon = own.photon;
+        photon.source = FootprintSource::Divided;
+        photon.flux *= own.width;
+        // For one cell towards the edge.
+        let mut unit = self.sign * photon.axes[self.axis];
+        let (mut inwards, mut extent) = (0.0, 1.0);
+        let steps = [Some(before), after].into_iter().flatten();
+        let steps = steps
+            .filter(|it| it.photon.object == photon.object)
+            .map(|it| in_plane(&photon, &it.photon) / (it.at - own.at));
+        let farthest = steps.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        if let Some(step) = farthest {
+            let length = unit.length();
+            let ratio = length / step.length();
+            let mut is_fitted = false;
+            if after.is_none() {
+                let slope = length / before.photon.axes[self.axis].length();
+                (inwards, extent) = match Silhouette::of(ratio, slope) {
+                    Some(silhouette) => {
+                        is_fitted = true;
+                        let fit = silhouette.fit();
+                        (fit.inwards, fit.extent)
+                    }
+                    None => (EDGE_SHIFT, EDGE_EXTENT),
+                };
+            }
+            if is_fitted || !(ratio <= LIMIT) {
+                unit = step;
+            }
+        }
+        photon.position -= inwards * own.width * unit;
+        photon.axes[self.axis] = self.sign * extent * own.width * unit;
+        let along = &mut photon.axes[1 - self.axis];
+        *along = self.narrowing * *along + self.sign * own.slant * unit;
+        photon
+    }
+}
