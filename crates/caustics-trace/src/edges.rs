@@ -1,21 +1,16 @@
+use std::ops::Range;
+
 use caustics_accel::Intersect;
 use glam::{Vec2, Vec3};
 
 use crate::emission::EmissionSample;
 use crate::ledger::EnergyLedger;
-use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons};
+use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO};
 use crate::path_guide::PathGuide;
 use crate::photon::{FootprintSource, Photon};
 use crate::silhouette::Silhouette;
 use crate::trace::Batch;
 use crate::tracer::PathTracer;
-
-fn env(name: &str, or: f32) -> f32 {
-    std::env::var(name)
-        .ok()
-        .and_then(|it| it.parse().ok())
-        .unwrap_or(or)
-}
 
 /// How often the stretch in which a row's end lies is halved: it is known to a sixteenth of a cell
 /// then, which is the most that the narrowest stratum can do with.
@@ -44,7 +39,7 @@ const SIGNIFICANT: f32 = 0.1;
 pub(crate) struct EdgeTracer<'a, 'b, I: ?Sized> {
     batch: &'b Batch<'a, I>,
     tracer: PathTracer<'a, I, 2>,
-    /// Of what has been counted since it was taken.
+    /// Counts, but for the rays.
     ledger: EnergyLedger,
 }
 
@@ -79,19 +74,22 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         }
     }
 
-    /// What has been counted since the last time: rays, photons divided and footprints replaced.
-    pub(crate) fn take_ledger(&mut self) -> EnergyLedger {
-        self.ledger.rays = std::mem::take(&mut self.tracer.ledger).rays;
-        std::mem::take(&mut self.ledger)
+    /// The photons of some points, with checked footprints and divided at the ends of rows, and what
+    /// was counted: rays, photons divided and footprints replaced.
+    pub(crate) fn checked(
+        mut self,
+        lattice: &LatticePhotons<'_>,
+        points: Range<u32>,
+    ) -> (Vec<Photon>, EnergyLedger) {
+        let mut checked = Vec::new();
+        for point in points {
+            self.check(lattice, point, &mut checked);
+        }
+        self.ledger.rays = self.tracer.ledger.rays;
+        (checked, self.ledger)
     }
 
-    /// The photons of one point, with checked footprints; those at the end of a row are divided.
-    pub(crate) fn photons(
-        &mut self,
-        lattice: &LatticePhotons<'_>,
-        point: u32,
-        checked: &mut Vec<Photon>,
-    ) {
+    fn check(&mut self, lattice: &LatticePhotons<'_>, point: u32, checked: &mut Vec<Photon>) {
         let own = lattice.photons_of(point);
         let flux = |photon: &Photon| photon.flux.max_element();
         let brightest = lattice.photons[own.clone()].iter().map(flux);
@@ -100,7 +98,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         for (index, footprint) in own.zip(lattice.checked(point)) {
             let photon = &lattice.photons[index];
             let is_worth_it = photon.source != FootprintSource::Thinned
-                && flux(photon) >= env("SIGNIF", SIGNIFICANT) * brightest;
+                && flux(photon) >= SIGNIFICANT * brightest;
             let path = lattice.paths[index];
             let landed = neighbours.map(|pair| pair.map(|at| lattice.photon_of(at?, path)));
             let number = lattice.lattice.number(point);
@@ -152,11 +150,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         let Some((row, reach)) = nearest else {
             return false;
         };
-        let slant = if env("SLANT", 1.0) > 0.0 {
-            2.0 * row.sign * (self.end(&row, 0.5, reach - 0.5) - reach)
-        } else {
-            0.0
-        };
+        let slant = 2.0 * row.sign * (self.end(&row, 0.5, reach - 0.5) - reach);
         let cells = 0.5 + reach;
         let strata = STRATA.map(|(low, high)| {
             let at = 0.5 * (low + high) * cells - 0.5;
@@ -188,12 +182,18 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             sign: row.sign,
             narrowing,
         };
-        divided.extend([
+        let parts = [
             edge.footprint(&first, &before, Some(&second)),
             edge.footprint(&second, &first, Some(&last)),
             edge.footprint(&last, &second, None),
-        ]);
-        true
+        ];
+        let are_finite = parts
+            .iter()
+            .all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));
+        if are_finite {
+            divided.extend(parts);
+        }
+        are_finite
     }
 
     /// Makes sure that the way of a path is known.
@@ -217,7 +217,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
     fn end(&mut self, row: &Row, across: f32, from: f32) -> f32 {
         let mut width = 0.5;
         let mut at = from;
-        for _ in 0..env("HALV", HALVINGS as f32) as u32 {
+        for _ in 0..HALVINGS {
             if self
                 .photon_at(row, row.offset(at + width, across))
                 .is_some()
@@ -312,7 +312,7 @@ impl Edge {
         let farthest = steps.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         if let Some(step) = farthest {
             let length = unit.length();
-            let ratio = length / step.length();
+            let ratio = (length / step.length()).min(MAX_RATIO);
             let mut is_fitted = false;
             if after.is_none() {
                 let slope = length / before.photon.axes[self.axis].length();
@@ -325,7 +325,7 @@ impl Edge {
                     None => (EDGE_SHIFT, EDGE_EXTENT),
                 };
             }
-            if is_fitted || !(ratio <= LIMIT) {
+            if is_fitted || ratio > LIMIT {
                 unit = step;
             }
         }

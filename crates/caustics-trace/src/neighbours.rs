@@ -25,9 +25,20 @@ pub(crate) const LIMIT: f32 = 1.5;
 pub(crate) const EDGE_SHIFT: f32 = 0.13;
 pub(crate) const EDGE_EXTENT: f32 = 0.69;
 
+/// How many times as far away on the one side as on the other the neighbours along an axis land where
+/// a photon's light is taken to reach halfway to each of them.
+///
+/// Where a surface's curvature jumps, a derivative is that of one side alone: with the other side's
+/// photons close by, a footprint as long as the far ones are away reaches over the end of the light
+/// as a row of teeth.
+const UNEVEN: f32 = 2.0;
+
+/// How many times as long as halfway to both neighbours an axis must be for that.
+const LONGER: f32 = 1.15;
+
 /// The largest ratio of a differential to the distance of a neighbour that is told from a larger
 /// one.
-const MAX_RATIO: f32 = 1e3;
+pub(crate) const MAX_RATIO: f32 = 1e3;
 
 /// The photons of an emitter, in the order of a lattice, with what their paths met.
 pub(crate) struct LatticePhotons<'a> {
@@ -109,6 +120,28 @@ struct Landed {
     ratio: f32,
     /// Where the light ends on one side of the photon.
     edge: Option<Edge>,
+    /// What is halfway to the two, if they are unevenly far away.
+    halfway: Option<Halfway>,
+}
+
+/// What lies between the middles of the ways to two neighbours on opposite sides.
+struct Halfway {
+    /// From the photon to its middle.
+    shift: Vec3,
+    axis: Vec3,
+}
+
+impl Halfway {
+    /// By the steps to the neighbours before and after a photon and the length of its axis; `None`
+    /// where that axis may stay.
+    fn of(before: Vec3, after: Vec3, length: f32) -> Option<Self> {
+        let (a, b) = (before.length(), after.length());
+        let is_uneven = a.max(b) > UNEVEN * a.min(b) && length > LONGER * 0.5 * (a + b);
+        (is_uneven && before.dot(after) < 0.0).then(|| Self {
+            shift: 0.25 * (before + after),
+            axis: 0.5 * (after - before),
+        })
+    }
 }
 
 enum Edge {
@@ -125,11 +158,13 @@ impl Landed {
             let displacement = neighbour.position - photon.position;
             displacement - photon.normal * displacement.dot(photon.normal)
         };
-        let (farthest, beside) = pair
-            .iter()
+        let steps = pair.map(|it| {
+            let neighbour = it.filter(|it| it.object == photon.object)?;
+            Some((in_plane(neighbour), neighbour.axes[number]))
+        });
+        let (farthest, beside) = steps
+            .into_iter()
             .flatten()
-            .filter(|it| it.object == photon.object)
-            .map(|it| (in_plane(it), it.axes[number]))
             .max_by(|(a, _), (b, _)| a.length_squared().total_cmp(&b.length_squared()))?;
         let distance = farthest.length();
         // By its largest coordinate where the square of a long axis overflows.
@@ -144,10 +179,15 @@ impl Landed {
         let slope = length / beside.length();
         let edge =
             is_edge.then(|| Silhouette::of(ratio, slope).map_or(Edge::Even, Edge::Silhouette));
+        let halfway = match steps {
+            [Some((before, _)), Some((after, _))] => Halfway::of(before, after, length),
+            _ => None,
+        };
         Some(Self {
             farthest,
             ratio,
             edge,
+            halfway,
         })
     }
 
@@ -183,6 +223,12 @@ pub(crate) fn checked(photon: &Photon, neighbours: &[[Option<&Photon>; 2]; 2]) -
     }
     for (axis, landed) in footprint.axes.iter_mut().zip(&landed) {
         let Some(landed) = landed else { continue };
+        if let Some(halfway) = &landed.halfway {
+            footprint.source = FootprintSource::Neighbour;
+            footprint.position += halfway.shift;
+            *axis = halfway.axis;
+            continue;
+        }
         let (inwards, extent) = match &landed.edge {
             Some(Edge::Silhouette(silhouette)) => {
                 let fit = silhouette.fit();
@@ -243,6 +289,25 @@ mod tests {
         let found = checked(&middle, &[[None; 2]; 2]);
         assert_eq!(found.axes, middle.axes);
         assert_eq!(found.source, FootprintSource::Differential);
+    }
+
+    #[test]
+    fn between_near_and_far_neighbours_light_reaches_halfway_to_each() {
+        let middle = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
+        let near = photon(-0.1 * Vec3::X, [0.1 * Vec3::X, Vec3::Z]);
+        let far = photon(Vec3::X, middle.axes);
+        let found = checked(&middle, &[[Some(&near), Some(&far)], [None; 2]]);
+        assert_eq!(found.position, 0.225 * Vec3::X);
+        assert_eq!(found.axes, [0.55 * Vec3::X, Vec3::Z]);
+        assert_eq!(found.source, FootprintSource::Neighbour);
+        // At a fold both are on one side, and the far one says how far the light goes.
+        let folded = photon(0.1 * Vec3::X, near.axes);
+        let found = checked(&middle, &[[Some(&folded), Some(&far)], [None; 2]]);
+        assert_eq!((found.position, found.axes), (middle.position, middle.axes));
+        // A short axis is that of the near side, whose light it describes.
+        let short = photon(Vec3::ZERO, near.axes);
+        let found = checked(&short, &[[Some(&near), Some(&far)], [None; 2]]);
+        assert_eq!((found.position, found.axes), (short.position, short.axes));
     }
 
     #[test]

@@ -20,6 +20,10 @@ use crate::wave::{WAVE, Wave};
 /// Photons that one task traces: enough to share out, few enough to balance.
 const CHUNK: u32 = 2048;
 
+/// Points whose photons one task divides at edges. More, since each task finds the ways of all paths
+/// that end there anew.
+const EDGE_CHUNK: u32 = 8192;
+
 /// Traces photons from all lights of `world` and returns those that landed after at least one
 /// specular event, with the ledger of where all the energy went.
 ///
@@ -270,27 +274,20 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         if !self.options.divide_edges || self.options.branching != Branching::SplitAll {
             return traced.checked(lattice, points);
         }
-        let chunks = (points.len() as u32).div_ceil(CHUNK);
+        let chunks = (points.len() as u32).div_ceil(EDGE_CHUNK);
         let parts: Vec<(Vec<Photon>, EnergyLedger)> = traced.with_neighbours(lattice, |photons| {
-            let check = |edges: &mut EdgeTracer<'_, '_, I>, chunk: u32| {
-                let start = points.start + chunk * CHUNK;
-                let mut checked = Vec::new();
-                for point in start..points.end.min(start.saturating_add(CHUNK)) {
-                    edges.photons(photons, point, &mut checked);
-                }
-                (checked, edges.take_ledger())
+            let check = |chunk: u32| {
+                let start = points.start + chunk * EDGE_CHUNK;
+                let end = points.end.min(start.saturating_add(EDGE_CHUNK));
+                EdgeTracer::new(self).checked(photons, start..end)
             };
             #[cfg(feature = "parallel")]
             let parts = {
                 use rayon::prelude::*;
-                let chunks = (0..chunks).into_par_iter();
-                chunks.map_init(|| EdgeTracer::new(self), check).collect()
+                (0..chunks).into_par_iter().map(check).collect()
             };
             #[cfg(not(feature = "parallel"))]
-            let parts = {
-                let mut edges = EdgeTracer::new(self);
-                (0..chunks).map(|it| check(&mut edges, it)).collect()
-            };
+            let parts = (0..chunks).map(check).collect();
             parts
         });
         let mut checked = Vec::with_capacity(parts.iter().map(|(it, _)| it.len()).sum());

@@ -7,6 +7,8 @@ const EDGE_EXTENT: f32 = 0.69;
 const SILHOUETTE_EXTENT: f32 = 0.78;
 const LEAST_SILHOUETTE: f32 = 1.02;
 const AGREEMENT: f32 = 0.1;
+const UNEVEN: f32 = 2.0;
+const LONGER: f32 = 1.15;
 const MAX_RATIO: f32 = 1e3;
 const FAR_INSIDE: f32 = 1e30;
 
@@ -31,6 +33,11 @@ struct Landing {
     is_sure: bool,
     is_there: bool,
     is_edge: bool,
+    // Whether the neighbours on both sides are unevenly far away, so that the light reaches halfway
+    // to each: its middle, from the photon, and its axis.
+    is_uneven: bool,
+    halfway_shift: vec3<f32>,
+    halfway_axis: vec3<f32>,
 }
 
 struct CheckedAxis {
@@ -85,6 +92,15 @@ fn landing_of(
     if distance > 0.0 {
         landing.ratio = min(length / distance, MAX_RATIO);
     }
+    if has_before && has_after {
+        let a = length_of(before_in_plane);
+        let b = length_of(after_in_plane);
+        landing.is_uneven = max(a, b) > UNEVEN * min(a, b)
+            && length > LONGER * 0.5 * (a + b)
+            && dot(before_in_plane, after_in_plane) < 0.0;
+        landing.halfway_shift = 0.25 * (before_in_plane + after_in_plane);
+        landing.halfway_axis = 0.5 * (after_in_plane - before_in_plane);
+    }
     landing.is_edge = before.is_there != after.is_there;
     if landing.is_edge && landing.ratio > LEAST_SILHOUETTE {
         landing.inside = 1.0 / (4.0 * landing.ratio * (landing.ratio - 1.0));
@@ -98,6 +114,9 @@ fn landing_of(
 fn checked_axis(axis: vec3<f32>, landing: Landing) -> CheckedAxis {
     if !landing.is_there {
         return CheckedAxis(axis, vec3(0.0), false);
+    }
+    if landing.is_uneven {
+        return CheckedAxis(landing.halfway_axis, landing.halfway_shift, true);
     }
     // Inwards, and how wide.
     var fit = vec2(0.0, 1.0);

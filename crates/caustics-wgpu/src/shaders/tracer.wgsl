@@ -226,11 +226,14 @@ fn advance(branch_given: Branch) {
     let kind = bodies[point.body].kind;
     let splits_channels = branch.channel == ALL_CHANNELS && bodies[point.body].disperses != 0u;
     let whole = branch.flux;
+    let path = branch.path;
     for (var channel = 0u; channel < select(1u, 3u, splits_channels); channel++) {
         if splits_channels {
             branch.flux = vec3(0.0);
             branch.flux[channel] = whole[channel];
             branch.channel = channel;
+            // Each colour is a sheet of light of its own.
+            branch.path = extended(path, channel, 0u);
             if whole[channel] == 0.0 {
                 continue;
             }
