@@ -29,7 +29,10 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     let trace = || trace_photons(&stage.world, &stage.intersector, &options.trace, &|_| {});
     let map = trace()?;
     // The check moves photons at the edges of light, and weighs the last one before a silhouette.
-    let mut unchecked_options = options.trace;
+    let mut whole_options = options.trace;
+    whole_options.divide_edges = false;
+    let trace_whole = || trace_photons(&stage.world, &stage.intersector, &whole_options, &|_| {});
+    let mut unchecked_options = whole_options;
     unchecked_options.check_footprints = false;
     let trace_unchecked = || {
         trace_photons(
@@ -105,6 +108,9 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     group.throughput(Throughput::Elements(u64::from(PHOTONS)));
     group.bench_function("photons traced", |bencher| {
         bencher.iter(|| black_box(trace()));
+    });
+    group.bench_function("photons traced, whole at edges", |bencher| {
+        bencher.iter(|| black_box(trace_whole()));
     });
     group.bench_function("photons traced, footprints unchecked", |bencher| {
         bencher.iter(|| black_box(trace_unchecked()));

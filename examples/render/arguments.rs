@@ -35,7 +35,7 @@ usage: render [options] [scene.glb | scene.gltf]
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
                                                                     (split-all)
-  --refine LEVELS           divide cells of the lattice at edges, so often (0)
+  --edges divided|whole     whether photons are divided where sheets of light end (divided)
   --aim NAME                where lights aim: casters, cones around them, everywhere
                                                                     (casters)
   --out FILE.png            the picture                             (caustics.png)
@@ -154,7 +154,9 @@ impl Arguments {
                     ],
                 )?;
             }
-            "refine" => trace.refinement.levels = number(name, parser)?,
+            "edges" => {
+                trace.divide_edges = choice(name, parser, &[("divided", true), ("whole", false)])?;
+            }
             "aim" => {
                 trace.aim = choice(
                     name,

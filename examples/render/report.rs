@@ -99,6 +99,7 @@ impl<'a> Report<'a> {
             "normal_fallbacks": ledger.normal_fallbacks,
             "bounded_differentials": ledger.bounded_differentials,
             "replaced_differentials": ledger.replaced_differentials,
+            "divided_photons": ledger.divided_photons,
             "seconds": seconds,
             "photon_rays": ledger.rays,
             "photon_rays_per_second": self.photon_rays_per_second(),

@@ -400,6 +400,7 @@ fn statistics_have_their_documented_keys_and_balance() -> TestResult {
         "normal_fallbacks",
         "bounded_differentials",
         "replaced_differentials",
+        "divided_photons",
         "seconds",
         "photon_rays",
         "photon_rays_per_second",

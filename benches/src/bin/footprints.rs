@@ -32,6 +32,7 @@ struct Measured {
     truncations: Vec<Errors>,
     anisotropies: Vec<Errors>,
     kernels: Vec<Errors>,
+    whole_edges: Errors,
     unchecked: Errors,
     read_at_middles: Errors,
 }
@@ -93,6 +94,8 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
             ..default
         },
     )?;
+    options.divide_edges = false;
+    let whole_edges = errors(&trace(&options)?.photons, &default)?;
     options.check_footprints = false;
     let unchecked = errors(&trace(&options)?.photons, &default)?;
     Ok(Measured {
@@ -101,6 +104,7 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
         truncations,
         anisotropies,
         kernels,
+        whole_edges,
         unchecked,
         read_at_middles,
     })
@@ -177,13 +181,14 @@ Every number is the same on any machine.
     table(
         &mut text,
         "Checks",
-        "Without the check against neighbours (`TraceOptions::check_footprints`), and without the integral \
-         of small footprints over the pixel (`FootprintOptions::integrate_pixels`).",
-        &["**both**", "unchecked", "read at middles"].map(str::to_owned),
+        "Without division at the edges of sheets of light (`TraceOptions::divide_edges`), without that and \
+         the check against neighbours (`TraceOptions::check_footprints`), and, with both, without the \
+         integral of small footprints over the pixel (`FootprintOptions::integrate_pixels`).",
+        &["**all**", "edges whole", "unchecked", "read at middles"].map(str::to_owned),
         measured,
         |it| {
-            let both = it.scales[SCALES.iter().position(|it| *it == 0.55).unwrap_or(0)];
-            vec![both, it.unchecked, it.read_at_middles]
+            let all = it.scales[SCALES.iter().position(|it| *it == 0.55).unwrap_or(0)];
+            vec![all, it.whole_edges, it.unchecked, it.read_at_middles]
         },
         &of_default,
     )?;

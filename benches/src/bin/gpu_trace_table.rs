@@ -98,7 +98,9 @@ fn measured(
         intersector: rays,
         ..
     } = Stage::load(name)?;
+    // The shaders do not divide photons at edges.
     let options = TraceOptions {
+        divide_edges: false,
         photons,
         ..TraceOptions::default()
     };

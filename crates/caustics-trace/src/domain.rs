@@ -79,18 +79,6 @@ impl EmissionDomain {
         }
     }
 
-    /// How many times as long along its first parameter the domain is as along its second.
-    #[must_use]
-    pub fn aspect(&self) -> f32 {
-        match self {
-            Self::Rectangle {
-                edges: [along, across],
-                ..
-            } => along.length() / across.length(),
-            _ => 1.0,
-        }
-    }
-
     /// A point where rays start, to find the media around it: `None` for a light that is infinitely
     /// far away.
     #[must_use]

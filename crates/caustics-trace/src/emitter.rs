@@ -134,11 +134,6 @@ impl Emitter {
         self.domain.dimensions()
     }
 
-    /// How many times as long along its first parameter the domain is as along its second.
-    pub(crate) fn aspect(&self) -> f32 {
-        self.domain.aspect()
-    }
-
     /// The photon of a sample.
     ///
     /// `None` for a sample that stands for no light: outside a spot light's cone, below the horizon

@@ -245,26 +245,6 @@ impl EnergyLedger {
         }
     }
 
-    /// Takes back another ledger's entries: its photons are to count as not emitted. Its rays stay
-    /// and are added: they were traced.
-    pub(crate) fn retract(&mut self, other: &Self) {
-        self.emitted.retract(&other.emitted);
-        self.roulette_gain -= other.roulette_gain;
-        for (mine, theirs) in self.fates.iter_mut().zip(&other.fates) {
-            mine.retract(theirs);
-        }
-        self.normal_fallbacks = self.normal_fallbacks.saturating_sub(other.normal_fallbacks);
-        self.replaced_differentials = self
-            .replaced_differentials
-            .saturating_sub(other.replaced_differentials);
-        self.divided_photons = self.divided_photons.saturating_sub(other.divided_photons);
-        self.edge_gain -= other.edge_gain;
-        self.bounded_differentials = self
-            .bounded_differentials
-            .saturating_sub(other.bounded_differentials);
-        self.rays += other.rays;
-    }
-
     /// Adds a line that was summed elsewhere to that of `fate`.
     pub fn add(&mut self, fate: Fate, entry: &LedgerEntry) {
         self.fates[fate as usize].merge(entry);

@@ -62,7 +62,7 @@
 //! | trace them in parts | [`PhotonStream`] | |
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
-//! | emit more finely where paths part, in still pictures | [`Refinement`] | |
+//! | divide photons at the edges of sheets of light | [`TraceOptions::divide_edges`] | |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
 //! | leave out what a host can do without | [`Culling`], [`ViewVolume`], [`SolidAngleLimit`] | |
 //! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
@@ -139,7 +139,6 @@ mod path_guide;
 mod photon;
 mod plan;
 mod projection_map;
-mod refine;
 mod scatter;
 mod silhouette;
 mod sky_emission;
@@ -166,7 +165,7 @@ pub use optics::{
     CHANNEL_WAVELENGTHS, beer_lambert, dispersed_ior, fresnel_dielectric, fresnel_schlick, reflect,
     refract,
 };
-pub use options::{Aim, Branching, Refinement, TraceError, TraceOptions};
+pub use options::{Aim, Branching, TraceError, TraceOptions};
 pub use photon::{FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;

@@ -67,7 +67,8 @@ pub struct LivePhotons {
 impl LivePhotons {
     /// Traces all photons.
     ///
-    /// [`Refinement`](crate::Refinement) is left out: its photons depend on each other.
+    /// Photons are not divided at edges ([`TraceOptions::divide_edges`]): what lies beside a path is not
+    /// followed from frame to frame.
     ///
     /// # Errors
     /// If the options are out of range.
@@ -76,11 +77,9 @@ impl LivePhotons {
         intersect: &I,
         options: &TraceOptions,
     ) -> Result<Self, TraceError> {
-        let mut options = *options;
-        options.refinement.levels = 0;
-        let plan = EmissionPlan::new(world, intersect, &options)?;
+        let plan = EmissionPlan::new(world, intersect, options)?;
         let mut live = Self {
-            options,
+            options: *options,
             space: Space::around(&world.bounds()),
             batches: vec![Vec::new(); plan.batches().len()],
             plan,

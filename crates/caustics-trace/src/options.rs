@@ -59,8 +59,6 @@ pub struct TraceOptions {
     pub share_floor: f32,
     /// The points that choose emission directions and positions.
     pub sequence: Sequence,
-    /// Where the lattice is made finer.
-    pub refinement: Refinement,
     /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
     /// those are nearer, and drawn in at the edges of sheets of light.
     pub check_footprints: bool,
@@ -77,32 +75,6 @@ pub struct TraceOptions {
     pub culling: Culling,
 }
 
-/// Where an emission lattice is made finer: at the edges of caustics, at folds, at silhouettes.
-///
-/// It needs [`Sequence::Grid`] and a light without area; other photons are emitted evenly. It pays
-/// where a caustic has hard edges against the dark (three times less error from the same photons
-/// inside a mirror ring), costs more rays where glass reflects light many times inside, and makes
-/// the photons depend on the scene, so that they jump when it moves: it is for still pictures, and
-/// off unless asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refinement {
-    /// How often a cell may be divided; 0 emits evenly.
-    pub levels: u32,
-    /// Footprints narrower than this are fine enough, and landing this close to where a neighbour's
-    /// differential says is close enough: in parts of the size of all specular objects together
-    /// (the diagonal of the box around them).
-    pub detail: f32,
-}
-
-impl Default for Refinement {
-    fn default() -> Self {
-        Self {
-            levels: 0,
-            detail: 1.0 / 1000.0,
-        }
-    }
-}
-
 impl Default for TraceOptions {
     fn default() -> Self {
         Self {
@@ -114,7 +86,6 @@ impl Default for TraceOptions {
             aim: Aim::Casters,
             share_floor: 0.25,
             sequence: Sequence::Grid,
-            refinement: Refinement::default(),
             check_footprints: true,
             divide_edges: true,
             differentials: true,
@@ -132,11 +103,6 @@ impl TraceOptions {
         if !(0.0..=1.0).contains(&self.min_weight) {
             return Err(TraceError::MinWeight {
                 min_weight: self.min_weight,
-            });
-        }
-        if !(self.refinement.detail >= 0.0 && self.refinement.detail.is_finite()) {
-            return Err(TraceError::Detail {
-                detail: self.refinement.detail,
             });
         }
         if !(self.culling.min_flux >= 0.0 && self.culling.min_flux.is_finite()) {
@@ -206,12 +172,6 @@ pub enum TraceError {
         steradians: f32,
         /// The eye, in metres.
         eye: [f32; 3],
-    },
-    /// A detail that is no length.
-    #[error("the detail of refinement {detail} is not a finite number of at least 0")]
-    Detail {
-        /// The detail, in parts of the size of the specular objects.
-        detail: f32,
     },
     /// A depth at which no path reaches a receiver after a specular surface.
     #[error("the maximum depth {max_depth} is less than 2, so no caustic could be stored")]

@@ -100,20 +100,6 @@ impl ProjectionMap {
         self.is_marked(cell.y * RESOLUTION + cell.x)
     }
 
-    /// Whether any marked cell overlaps a rectangle of the unit square.
-    pub(crate) fn meets(&self, low: Vec2, high: Vec2) -> bool {
-        let last = glam::UVec2::splat(RESOLUTION - 1);
-        let cell = |at: Vec2| {
-            (at * RESOLUTION as f32)
-                .max(Vec2::ZERO)
-                .as_uvec2()
-                .min(last)
-        };
-        let (from, to) = (cell(low), cell(high));
-        (from.y..=to.y)
-            .any(|row| (from.x..=to.x).any(|column| self.is_marked(row * RESOLUTION + column)))
-    }
-
     /// The marked cells of a row, as ranges of columns from left to right.
     pub(crate) fn runs(&self, row: u32) -> impl Iterator<Item = std::ops::Range<u32>> {
         let first = row.min(RESOLUTION - 1) * RESOLUTION;

@@ -54,10 +54,8 @@ pub struct PhotonStream {
 
 impl PhotonStream {
     /// Traces the next photons, and returns those that are settled with the part of the ledger that
-    /// has come since, in which only they count as stored. World, plan and options are to be the same in each call; [`Refinement`] is
-    /// left out, since its photons depend on each other.
-    ///
-    /// [`Refinement`]: crate::Refinement
+    /// has come since, in which only they count as stored. World, plan and options are to be the
+    /// same in each call.
     ///
     /// # Errors
     /// If the options are out of range.

@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use caustics_accel::Intersect;
-use caustics_sampling::{CounterRng, Sequence};
+use caustics_sampling::CounterRng;
 use caustics_scene::World;
 use glam::DVec3;
 
@@ -12,7 +12,6 @@ use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{Branching, TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
 use crate::plan::{EmissionBatch, EmissionPlan};
-use crate::refine::trace_refined;
 use crate::traced::Traced;
 use crate::tracer::PathTracer;
 use crate::wave::{WAVE, Wave};
@@ -67,19 +66,7 @@ pub fn trace_plan<I: Intersect + ?Sized>(
                 planned,
                 earlier: &of_light[..number],
             };
-            if batch.is_refined() {
-                let levels = options.refinement.levels;
-                let detail =
-                    options.refinement.detail * world.specular_bounds().diagonal().length();
-                let mut refined = trace_refined(&batch, levels, detail, progress);
-                options
-                    .culling
-                    .apply(&mut refined.photons, &mut refined.ledger);
-                map.photons.append(&mut refined.photons);
-                map.ledger.merge(&refined.ledger);
-            } else {
-                batch.trace(&mut map, 0..planned.count(), progress);
-            }
+            batch.trace(&mut map, 0..planned.count(), progress);
         }
         if let Some(first) = of_light.first() {
             let aimed = counted(&map) - before;
@@ -98,8 +85,7 @@ pub fn trace_plan<I: Intersect + ?Sized>(
 /// photons in their order loses neither with [`PhotonStream`](crate::PhotonStream).
 ///
 /// # Errors
-/// If the options are out of range. Those that ask for a [`Refinement`](crate::Refinement) are taken
-/// as if they did not: its photons depend on each other.
+/// If the options are out of range.
 pub fn trace_part<I: Intersect + ?Sized>(
     world: &World,
     intersect: &I,
@@ -198,15 +184,6 @@ pub(crate) struct Batch<'a, I: ?Sized> {
 }
 
 impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
-    /// Whether its lattice is made finer where it must.
-    fn is_refined(&self) -> bool {
-        self.options.refinement.levels > 0
-            && self.options.differentials
-            && self.options.sequence == Sequence::Grid
-            && self.planned.emitter().dimensions() == 2
-            && self.planned.count() > 0
-    }
-
     /// A tracer for its photons.
     pub(crate) fn tracer<const N: usize>(&self) -> PathTracer<'a, I, N> {
         let caster = self.planned.emitter().caster();

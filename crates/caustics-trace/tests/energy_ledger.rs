@@ -6,7 +6,7 @@ use caustics_geometry::shapes::quad;
 use caustics_sampling::Sequence;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{DVec3, Vec3};
-use caustics_trace::{Aim, Branching, Fate, Refinement, TraceOptions, trace_photons};
+use caustics_trace::{Aim, Branching, Fate, TraceOptions, trace_photons};
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
 
@@ -120,7 +120,7 @@ proptest! {
                     let min_weight = if branching == Branching::SplitAll { 1e-2 } else { 1e-3 };
                     let options = TraceOptions {
                         photons: 500, seed, max_depth, branching, min_weight, aim, sequence,
-                        refinement: Refinement { levels: (seed % 3) as u32, ..Refinement::default() },
+                        divide_edges: seed % 3 != 0,
                         differentials: seed % 4 != 0,
                         ..TraceOptions::default()
                     };

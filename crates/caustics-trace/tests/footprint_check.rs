@@ -24,6 +24,7 @@ fn trace(check_footprints: bool, photons: u32) -> PhotonMap {
     let options = TraceOptions {
         photons,
         check_footprints,
+        divide_edges: false,
         ..TraceOptions::default()
     };
     trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options")

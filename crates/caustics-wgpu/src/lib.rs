@@ -125,7 +125,8 @@
 //!
 //! # Limits
 //!
-//! The tracer takes no refined lattices, numbers at most 2¹⁶ dielectrics, and binds each kind of
+//! The tracer does not divide photons at the edges of sheets of light
+//! ([`divide_edges`](caustics_trace::TraceOptions::divide_edges) is left aside), numbers at most 2¹⁶ dielectrics, and binds each kind of
 //! data whole: two million triangles in 128 MiB. Where there is no room for all records of a batch,
 //! which of them are lost is another matter in every run; batches that are smaller than all photons
 //! trace a row of the lattice on either side again, for the check of footprints. 28 branches of a photon may wait; beyond 24 it goes

@@ -52,8 +52,8 @@ impl TracePlan {
     ///
     /// # Errors
     /// [`GpuError::Options`] for options out of range, [`GpuError::Unsupported`] for
-    /// [`Refinement`](caustics_trace::Refinement), [`Culling`] and light from an
-    /// [`Environment`](caustics_scene::Environment), and [`GpuError::TooMany`].
+    /// [`Culling`] and light from an [`Environment`](caustics_scene::Environment), and
+    /// [`GpuError::TooMany`].
     pub fn new<I: Intersect + ?Sized>(
         world: &World,
         intersect: &I,
@@ -221,9 +221,7 @@ impl TracePlan {
 /// What the options ask for that the shaders do not do.
 fn unsupported(options: &TraceOptions) -> Option<&'static str> {
     let none = Culling::default();
-    if options.refinement.levels > 0 {
-        Some("photons whose lattice is refined")
-    } else if options.culling.min_flux != none.min_flux {
+    if options.culling.min_flux != none.min_flux {
         Some("photons that are culled by their flux (`Culling::min_flux`)")
     } else if options.culling.max_area != none.max_area {
         Some("photons that are culled by their footprint's area (`Culling::max_area`)")

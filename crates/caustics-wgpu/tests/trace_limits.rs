@@ -8,7 +8,7 @@ mod common;
 
 use caustics_geometry::shapes::{heightfield, icosphere};
 use caustics_scene::{Camera, Environment, Instance, Light, Material, Scene, Shape, World};
-use caustics_trace::{Culling, Refinement, SolidAngleLimit, TraceOptions, ViewVolume};
+use caustics_trace::{Culling, SolidAngleLimit, TraceOptions, ViewVolume};
 use caustics_wgpu::glam::{Affine3A, Vec3};
 use caustics_wgpu::{
     GpuError, PhotonBuffers, RendererError, SceneBuffers, SceneRefit, TraceCounters, TracePlan,
@@ -279,14 +279,6 @@ fn what_the_shaders_cannot_do_is_an_error() {
     let (device, _) = gpu;
     let stage = lit(glass(), lamp());
     let plan = |options: &TraceOptions| TracePlan::new(&stage.world, &stage.rays, options);
-    let refined = TraceOptions {
-        refinement: Refinement {
-            levels: 2,
-            ..Refinement::default()
-        },
-        ..options()
-    };
-    assert!(matches!(plan(&refined), Err(GpuError::Unsupported { .. })));
     let camera = Camera::look_at("", [0.0, 1.0, 5.0], [0.0; 3], [0.0, 1.0, 0.0], 0.8).unwrap();
     let none = Culling::default();
     for (named, culling) in [
