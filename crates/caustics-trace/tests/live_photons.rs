@@ -77,6 +77,7 @@ fn options(sequence: Sequence) -> TraceOptions {
     TraceOptions {
         photons: 2_000,
         sequence,
+        divide_edges: false,
         ..TraceOptions::default()
     }
 }
