@@ -170,6 +170,7 @@ mod tests {
             object: 0,
             events: 1,
             source: caustics_trace::FootprintSource::Differential,
+            coverage: caustics_trace::Coverage::Cell,
         }
     }
 

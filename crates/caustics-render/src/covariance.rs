@@ -27,14 +27,11 @@ impl Covariance {
         covariance
     }
 
-    pub(crate) fn add_pixel(&mut self, pixel: &[Vec3; 2], normal: Vec3, kernel: FootprintKernel) {
+    /// Adds a variance along each of a pixel's edges, in squares of them.
+    pub(crate) fn add_pixel(&mut self, pixel: &[Vec3; 2], normal: Vec3, variance: f32) {
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         for axis in pixel {
-            self.add(
-                kernel.pixel_variance(),
-                axis.dot(tangent),
-                axis.dot(bitangent),
-            );
+            self.add(variance, axis.dot(tangent), axis.dot(bitangent));
         }
     }
 

@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use caustics_trace::Photon;
+use caustics_trace::{Coverage, Photon};
 use glam::{Vec2, Vec3};
 
 use crate::covariance::Covariance;
@@ -51,6 +51,14 @@ pub struct FootprintOptions {
     /// photons 2.5 instead of 3 changes the relMSE of ten scenes by -1 to 12 %, and takes 0 to 13 %
     /// off the splat's time of three.
     pub truncation: f32,
+    /// The same for photons that [overlap](Coverage::Overlap), as those of lights with an area do by
+    /// the dozen: there is no lattice of them in which the ends of Gaussians would show. Under the lamp
+    /// of a Cornell box, 2 instead of 3 changes the relMSE by 6 % with 65,536 photons, 2 % with 262,144
+    /// and -1 % with two million, and takes a third off the splat's time.
+    ///
+    /// A splat spares such photons more, where the kernel is Gaussian: it integrates over pixels only
+    /// what is narrower than a third of one, and draws what lies flat at a lower resolution.
+    pub overlap_truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at
     /// least 1. Infinite keeps every footprint as its differential says.
     pub max_anisotropy: f32,
@@ -73,6 +81,7 @@ impl Default for FootprintOptions {
             kernel: FootprintKernel::Gaussian,
             scale: 0.55,
             truncation: 3.0,
+            overlap_truncation: 2.0,
             max_anisotropy: f32::INFINITY,
             max_overlaps: f32::INFINITY,
             integrate_pixels: true,
@@ -89,10 +98,10 @@ impl FootprintOptions {
         if !(self.scale > 0.0 && self.scale.is_finite()) {
             return Err(RenderError::InvalidScale { scale: self.scale });
         }
-        if !TRUNCATIONS.contains(&self.truncation) {
-            return Err(RenderError::InvalidTruncation {
-                truncation: self.truncation,
-            });
+        for truncation in [self.truncation, self.overlap_truncation] {
+            if !TRUNCATIONS.contains(&truncation) {
+                return Err(RenderError::InvalidTruncation { truncation });
+            }
         }
         if self.max_anisotropy.is_nan() || self.max_anisotropy < 1.0 {
             return Err(RenderError::InvalidAnisotropy {
@@ -136,6 +145,7 @@ pub(crate) struct Density {
     kernel: TruncatedKernel,
     /// Index of its receiver among the world's objects.
     pub(crate) object: u32,
+    pub(crate) coverage: Coverage,
 }
 
 impl Density {
@@ -147,9 +157,21 @@ impl Density {
         options: &FootprintOptions,
         kernel: TruncatedKernel,
     ) -> Option<Self> {
+        let pixel = pixel.map(|edges| (edges, kernel.shape.pixel_variance()));
+        Self::with_variance(photon, pixel, options, kernel)
+    }
+
+    /// The density of a photon with a multiple of the variance of a pixel's edges on the receiver
+    /// added; a negative one makes it narrower.
+    pub(crate) fn with_variance(
+        photon: &Photon,
+        pixel: Option<([Vec3; 2], f32)>,
+        options: &FootprintOptions,
+        kernel: TruncatedKernel,
+    ) -> Option<Self> {
         let mut covariance = Covariance::of_axes(&photon.axes, photon.normal, options);
-        if let Some(pixel) = pixel {
-            covariance.add_pixel(&pixel, photon.normal, kernel.shape);
+        if let Some((edges, variance)) = pixel {
+            covariance.add_pixel(&edges, photon.normal, variance);
         }
         Self::spread(&Beam::of(photon), &covariance, kernel)
     }
@@ -206,7 +228,8 @@ impl Density {
             xy: xx * xy,
             yy: xy * xy + yy * yy,
         };
-        covariance.add_pixel(pixel, self.normal, self.kernel.shape);
+        let variance = self.kernel.shape.pixel_variance();
+        covariance.add_pixel(pixel, self.normal, variance);
         let cosine = (-self.incoming.dot(self.normal)).max(MIN_INCIDENCE);
         let beam = Beam {
             center: self.center,
@@ -214,6 +237,7 @@ impl Density {
             incoming: self.incoming,
             flux: self.strength * (xx * yy * cosine),
             object: self.object,
+            coverage: self.coverage,
         };
         Self::spread(&beam, &covariance, self.kernel)
     }
@@ -225,6 +249,7 @@ impl Density {
             incoming,
             flux,
             object,
+            coverage,
         } = *beam;
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let [[xx, _], [xy, yy]] = covariance.cholesky()?;
@@ -247,6 +272,7 @@ impl Density {
             strength: flux / (area * cosine),
             kernel,
             object,
+            coverage,
         };
         (area > 0.0 && density.strength.is_finite()).then_some(density)
     }
@@ -461,6 +487,7 @@ struct Beam {
     incoming: Vec3,
     flux: Vec3,
     object: u32,
+    coverage: Coverage,
 }
 
 impl Beam {
@@ -471,6 +498,7 @@ impl Beam {
             incoming: photon.incoming,
             flux: photon.flux,
             object: photon.object,
+            coverage: photon.coverage,
         }
     }
 }
@@ -492,6 +520,7 @@ pub(crate) struct Adjustment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::truncated_kernel::Kernels;
 
     /// Light falls nowhere beyond the radius, and close to it, for footprints that lie askew.
     #[test]
@@ -510,8 +539,9 @@ mod tests {
                 object: 0,
                 events: 1,
                 source: caustics_trace::FootprintSource::Differential,
+                coverage: caustics_trace::Coverage::Cell,
             };
-            let kernel = TruncatedKernel::of(&options);
+            let kernel = Kernels::of(&options).get(photon.coverage);
             let density = Density::new(&photon, None, &options, kernel).expect("it has an area");
             let radius = density.radius();
             let mut farthest = 0.0f32;

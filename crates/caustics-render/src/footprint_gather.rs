@@ -8,7 +8,7 @@ use crate::eye::Receiver;
 use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
 use crate::thinning::thin_wide;
-use crate::truncated_kernel::TruncatedKernel;
+use crate::truncated_kernel::Kernels;
 
 /// Footprints' spacings below this part of all are the close ones.
 const CLOSE_QUANTILE: f32 = 0.1;
@@ -67,7 +67,7 @@ pub struct GatherStats {
 ///
 /// ```
 /// use caustics_render::{FootprintGather, FootprintOptions};
-/// use caustics_trace::{FootprintSource, Photon};
+/// use caustics_trace::{Coverage, FootprintSource, Photon};
 /// use glam::Vec3;
 ///
 /// // One watt, straight down, over about a square decimetre of the floor.
@@ -80,6 +80,7 @@ pub struct GatherStats {
 ///     object: 0,
 ///     events: 1,
 ///     source: FootprintSource::Checked,
+///     coverage: Coverage::Cell,
 /// };
 /// let gather = FootprintGather::new(&[photon], &FootprintOptions::default())?;
 /// assert!(gather.irradiance(Vec3::ZERO, Vec3::Y).x > 50.0);
@@ -108,7 +109,7 @@ pub struct FootprintGather {
     footprints: Vec<Footprint>,
     /// One for each footprint.
     densities: Vec<Density>,
-    kernel: TruncatedKernel,
+    kernels: Kernels,
     /// By how much a search is widened, relative to a pixel's edges.
     blur_reach: f32,
     least_extent: f32,
@@ -141,7 +142,7 @@ impl FootprintGather {
             around.surface_area()
         };
         let extents = extent_bounds(&photons, options, diagonal);
-        let kernel = TruncatedKernel::of(options);
+        let kernels = Kernels::of(options);
 
         let mut stats = GatherStats {
             merged: given - photons.len() as u64,
@@ -149,7 +150,7 @@ impl FootprintGather {
         };
         let mut densities = Vec::with_capacity(photons.len());
         let prepared = in_chunks(&photons, |_, photon| {
-            Density::within(photon, &extents, options, kernel)
+            Density::within(photon, &extents, options, kernels.get(photon.coverage))
         });
         for one in prepared {
             let Some((density, Adjustment { widened, shortened })) = one else {
@@ -174,8 +175,8 @@ impl FootprintGather {
             pieces,
             footprints: densities.iter().map(Footprint::new).collect(),
             densities,
-            kernel,
-            blur_reach: kernel.search_reach() * kernel.shape.pixel_variance().sqrt(),
+            kernels,
+            blur_reach: kernels.blur_reach(),
             least_extent: extents.least,
             stats,
         })
@@ -221,7 +222,8 @@ impl FootprintGather {
         self.tree.for_each_around(target.position, |place| {
             let piece = &self.pieces[place];
             let index = piece.footprint as usize;
-            let kernel = self.footprints[index].kernel_at(piece, target, self.kernel);
+            let kernel = self.kernels.get(piece.coverage);
+            let kernel = self.footprints[index].kernel_at(piece, target, kernel);
             if kernel > 0.0 {
                 visit(&self.densities[index], kernel);
             }
@@ -458,6 +460,7 @@ mod tests {
             object: 0,
             events: 1,
             source: caustics_trace::FootprintSource::Differential,
+            coverage: caustics_trace::Coverage::Cell,
         }
     }
 
@@ -615,6 +618,7 @@ mod tests {
                     object: 0,
                     events: 1,
                     source: caustics_trace::FootprintSource::Differential,
+                    coverage: caustics_trace::Coverage::Cell,
                 }
             })
     }

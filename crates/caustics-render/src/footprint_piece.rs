@@ -1,4 +1,5 @@
 use caustics_geometry::Aabb;
+use caustics_trace::Coverage;
 use glam::{Vec2, Vec3};
 
 use crate::eye::Receiver;
@@ -46,6 +47,8 @@ pub(crate) struct Footprint {
 pub(crate) struct Piece {
     /// Index of the footprint.
     pub(crate) footprint: u32,
+    /// How the footprint lies among others, for which its own 64 bytes have no room.
+    pub(crate) coverage: Coverage,
     /// In standard deviations: from, and up to but not at.
     pub(crate) along: [f32; 2],
     /// In metres, on the side of the light: from, and up to but not at.
@@ -170,6 +173,7 @@ impl Cutting {
             shape.cut(pieces, |along, reached| {
                 let piece = Piece {
                     footprint: index,
+                    coverage: density.coverage,
                     along,
                     height: [from, to],
                 };

@@ -1,5 +1,5 @@
 use caustics_filter::Image;
-use caustics_trace::Photon;
+use caustics_trace::{Coverage, Photon};
 use glam::{Mat2, Vec2, Vec3};
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;
 use crate::splat_level::{Level, margin};
 use crate::surroundings::Surroundings;
-use crate::truncated_kernel::TruncatedKernel;
+use crate::truncated_kernel::{Kernels, TruncatedKernel};
 
 /// Photons that are prepared at a time: few enough that what is ready stays in the caches until every
 /// band of rows has drawn it.
@@ -28,12 +28,23 @@ const LEVELS: usize = 7;
 /// linear interpolation between the level's pixels then errs by 3 % of the footprint's peak.
 const LEVEL_SIGMA: f32 = 2.0;
 
+/// As [`LEVEL_SIGMA`], for Gaussians that overlap and light only their receiver's plane: made narrower
+/// by what interpolation adds to their variance, dozens of them sum to what they would else.
+const OVERLAP_LEVEL_SIGMA: f32 = 0.8;
+
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
 
 /// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles;
 /// narrower ones are integrated over the pixels.
 const INTEGRATED_SIGMA: f32 = 0.9;
+
+/// As [`INTEGRATED_SIGMA`], for footprints that overlap: those that are narrower still are lines of
+/// light that would leak into the pixels beside them.
+const OVERLAP_INTEGRATED_SIGMA: f32 = 0.35;
+
+/// Half a pixel's diagonal and a little, in pixels: no farther is the nearest pixel's middle.
+const LEAST_REACH: f32 = 0.75;
 
 /// Half the widest rectangle of pixels that a footprint is integrated over, beyond which the
 /// perspective bends it.
@@ -78,10 +89,10 @@ pub fn splat(
         passes.push(Pass::new(Level::finest(buffer, true)));
     }
     let surroundings = Surroundings::of(buffer);
-    let kernel = TruncatedKernel::of(options);
+    let kernels = Kernels::of(options);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
-        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options, kernel);
+        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options, kernels);
         for fate in &prepared {
             match fate {
                 Prepared::Splat(_) => stats.splatted += 1,
@@ -96,7 +107,7 @@ pub fn splat(
             &buffer.screen,
             &surroundings,
             options,
-            kernel,
+            kernels,
         ));
         for pass in &mut passes {
             pass.accumulate(&prepared, &buffer.screen, &surroundings);
@@ -192,8 +203,9 @@ impl PixelIntegral {
         pixel: &[Vec3; 2],
         center: Vec2,
         options: &FootprintOptions,
+        kernel: TruncatedKernel,
     ) -> Option<Self> {
-        if options.kernel != FootprintKernel::Gaussian || !options.integrate_pixels {
+        if kernel.shape != FootprintKernel::Gaussian || !options.integrate_pixels {
             return None;
         }
         let (tangent, bitangent) = photon.normal.any_orthonormal_pair();
@@ -204,9 +216,20 @@ impl PixelIntegral {
         let (short, _) = covariance.eigenvalues();
         let gaussian = PixelGaussian::new(center, &covariance);
         let strength = photon.flux * (to_pixels.determinant().abs() / incident_cosine(photon));
-        let is_small = short < INTEGRATED_SIGMA * INTEGRATED_SIGMA
-            && gaussian.extent().max_element() < INTEGRATED_EXTENT;
+        let limit = integrated_sigma(photon.coverage, kernel);
+        let is_small = short < limit * limit && gaussian.extent().max_element() < INTEGRATED_EXTENT;
         (is_small && strength.is_finite()).then_some(Self { gaussian, strength })
+    }
+}
+
+/// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles. It
+/// reaches one of them from wherever it stands.
+fn integrated_sigma(coverage: Coverage, kernel: TruncatedKernel) -> f32 {
+    let reaching = LEAST_REACH / kernel.reach();
+    let least = reaching * reaching - kernel.shape.pixel_variance();
+    match coverage {
+        Coverage::Overlap => OVERLAP_INTEGRATED_SIGMA.max(least.max(0.0).sqrt()),
+        _ => INTEGRATED_SIGMA,
     }
 }
 
@@ -238,7 +261,7 @@ fn prepare(
     screen: &Screen,
     surroundings: &Surroundings,
     options: &FootprintOptions,
-    kernel: TruncatedKernel,
+    kernels: Kernels,
 ) -> Vec<Prepared> {
     #[cfg(feature = "parallel")]
     {
@@ -246,13 +269,13 @@ fn prepare(
         photons
             .par_iter()
             .with_min_len(1024)
-            .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernel))
+            .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernels))
             .collect()
     }
     #[cfg(not(feature = "parallel"))]
     photons
         .iter()
-        .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernel))
+        .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernels))
         .collect()
 }
 
@@ -262,10 +285,10 @@ fn caught(
     screen: &Screen,
     surroundings: &Surroundings,
     options: &FootprintOptions,
-    kernel: TruncatedKernel,
+    kernels: Kernels,
 ) -> Vec<Prepared> {
     let one = |photon: &Photon| {
-        Splat::before_plane(photon, screen, surroundings, options, kernel).map(Prepared::Splat)
+        Splat::before_plane(photon, screen, surroundings, options, kernels).map(Prepared::Splat)
     };
     #[cfg(feature = "parallel")]
     {
@@ -287,12 +310,13 @@ impl Splat {
         screen: &Screen,
         surroundings: &Surroundings,
         options: &FootprintOptions,
-        kernel: TruncatedKernel,
+        kernels: Kernels,
     ) -> Option<Self> {
         if screen.facing_cosine(photon.position, photon.normal) >= LEAST_FACING {
             return None;
         }
         let pixel = screen.facing_axes(photon.position);
+        let kernel = kernels.get(photon.coverage);
         let density = Density::before_plane(photon, pixel, options, kernel)?;
         let [_, gate] = density.gate().divided();
         let bounds = Bounds::of(&density, [gate.before, gate.reach], screen).clipped(screen)?;
@@ -313,7 +337,7 @@ impl Splat {
             rows: [0; 2],
             integral: None,
         };
-        splat.choose_level(least_sigma(step_x, step_y));
+        splat.choose_level(least_sigma(step_x, step_y), LEVEL_SIGMA);
         splat.place(&bounds, screen);
         Some(splat)
     }
@@ -323,13 +347,14 @@ impl Splat {
         screen: &Screen,
         surroundings: &Surroundings,
         options: &FootprintOptions,
-        kernel: TruncatedKernel,
+        kernels: Kernels,
     ) -> Prepared {
         let facing = screen.facing_cosine(photon.position, photon.normal);
         if facing <= 0.0 {
             return Prepared::TurnedAway;
         }
         let pixel = screen.pixel_axes(photon.position, photon.normal);
+        let kernel = kernels.get(photon.coverage);
         let Some(density) = Density::new(photon, pixel, options, kernel) else {
             return Prepared::Invalid;
         };
@@ -368,13 +393,28 @@ impl Splat {
             rows: [0; 2],
             integral: None,
         };
-        splat.choose_level(sigma);
-        splat.flat = 0.5 * splat.stride() / pixels_per_height(&splat.density, screen);
-        let is_flat = in_reach.heights.iter().all(|it| it.abs() <= splat.flat);
+        let half_pixel = 0.5 / pixels_per_height(&splat.density, screen);
+        let is_coarse = splat.is_linear
+            && photon.coverage == Coverage::Overlap
+            && kernel.shape == FootprintKernel::Gaussian
+            && in_reach.is_own
+            && in_reach.is_flat(half_pixel)
+            && !surroundings.is_glossy;
+        if is_coarse {
+            splat.choose_level(sigma, OVERLAP_LEVEL_SIGMA);
+            splat.undo_interpolation(photon, pixel, options, kernel);
+        } else {
+            splat.choose_level(sigma, LEVEL_SIGMA);
+        }
+        splat.flat = splat.stride() * half_pixel;
+        let is_flat = in_reach.is_flat(splat.flat);
         splat.is_plain = is_flat && in_reach.is_own;
-        if splat.is_linear && !surroundings.is_glossy {
+        // Sigma has the pixel's own blur in it, and rounding.
+        let limit = integrated_sigma(photon.coverage, kernel);
+        let blurred = 1.01 * (limit * limit + kernel.shape.pixel_variance());
+        if splat.is_linear && sigma * sigma < blurred && !surroundings.is_glossy {
             splat.integral =
-                pixel.and_then(|pixel| PixelIntegral::of(photon, &pixel, center, options));
+                pixel.and_then(|pixel| PixelIntegral::of(photon, &pixel, center, options, kernel));
         }
         if let Some(integral) = splat.integral {
             let extent = integral.gaussian.extent();
@@ -408,9 +448,33 @@ impl Splat {
         STRIDE.pow(u32::from(self.level)) as f32
     }
 
-    fn choose_level(&mut self, mut sigma: f32) {
+    /// Makes the footprint narrower by as much as interpolation from its level will blur it.
+    fn undo_interpolation(
+        &mut self,
+        photon: &Photon,
+        pixel: Option<[Vec3; 2]>,
+        options: &FootprintOptions,
+        kernel: TruncatedKernel,
+    ) {
+        let (Some(pixel), 1..) = (pixel, self.level) else {
+            return;
+        };
+        // Each step to the next finer level takes a pixel's light from the coarser one's three
+        // quarters and one quarter of its side away: a variance of 3 / 16 of its square.
+        let pixels = self.stride() * self.stride();
+        let blur = 0.25 * (pixels - 1.0);
+        let variance = kernel.shape.pixel_variance() - blur;
+        let narrower = Density::with_variance(photon, Some((pixel, variance)), options, kernel);
+        if let Some(density) = narrower {
+            self.density = density;
+            [self.step_x, self.step_y] =
+                pixel.map(|edge| self.stride() * Vec2::from(density.along(edge)));
+        }
+    }
+
+    fn choose_level(&mut self, mut sigma: f32, least: f32) {
         let stride = STRIDE as f32;
-        while sigma >= LEVEL_SIGMA * stride && usize::from(self.level) + 1 < LEVELS {
+        while sigma >= least * stride && usize::from(self.level) + 1 < LEVELS {
             self.level += 1;
             sigma /= stride;
             self.center /= stride;
@@ -481,8 +545,9 @@ impl Splat {
         let half = discriminant.sqrt() / a;
         let middle = self.center.x - b / a - 0.5;
         // A texel's point need not be the pixel's middle: one more on either side.
-        let low = (middle - half).floor().clamp(first as f32, last as f32) as usize;
-        let high = ((middle + half).ceil() + 1.0).clamp(low as f32, last as f32) as usize;
+        // Conversion rounds down: nothing is negative.
+        let low = (middle - half).clamp(first as f32, last as f32) as usize;
+        let high = (middle + half + 2.0).clamp(low as f32, last as f32) as usize;
         low..high
     }
 

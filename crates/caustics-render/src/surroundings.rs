@@ -102,6 +102,13 @@ pub(crate) struct InReach {
     pub(crate) is_own: bool,
 }
 
+impl InReach {
+    /// Whether it all lies in the footprint's plane, to `flat` metres.
+    pub(crate) fn is_flat(&self, flat: f32) -> bool {
+        self.heights.iter().all(|it| it.abs() <= flat)
+    }
+}
+
 impl Surroundings {
     pub(crate) fn of(buffer: &GBuffer) -> Self {
         let [width, height] = [buffer.width(), buffer.height()].map(|size| size as usize);

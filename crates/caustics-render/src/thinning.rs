@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 use caustics_trace::Photon;
 
 use crate::footprint::FootprintOptions;
-use crate::truncated_kernel::TruncatedKernel;
+use crate::truncated_kernel::Kernels;
 
 /// Photons from which the size of the scene is taken.
 const SAMPLES: usize = 8192;
@@ -32,8 +32,9 @@ pub(crate) fn thin_wide<'a>(
     if !(scene > 0.0 && budget.is_finite()) {
         return Cow::Borrowed(photons);
     }
-    let reach = options.scale * TruncatedKernel::of(options).reach();
+    let kernels = Kernels::of(options);
     let area = |photon: &Photon| {
+        let reach = options.scale * kernels.get(photon.coverage).reach();
         let [a, b] = photon.axes;
         let squared = a.length_squared() + b.length_squared();
         (PI * reach * reach * squared).min(scene)
@@ -125,6 +126,7 @@ mod tests {
                 object: 0,
                 events: 1,
                 source: caustics_trace::FootprintSource::Differential,
+                coverage: caustics_trace::Coverage::Cell,
             })
             .collect()
     }

@@ -1,5 +1,7 @@
 use std::f32::consts::{PI, SQRT_2};
 
+use caustics_trace::Coverage;
+
 use crate::footprint::{FootprintOptions, MAX_SLIDE};
 use crate::footprint_kernel::FootprintKernel;
 
@@ -9,6 +11,40 @@ const PEAK_AT_THREE: f32 = 0.160_942_8;
 
 /// The part of a normal distribution that lies within three standard deviations: `1 - exp(-3² / 2)`.
 const WITHIN_THREE: f64 = 0.988_891_003_461_758;
+
+/// The kernels of all photons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kernels {
+    cell: TruncatedKernel,
+    overlap: TruncatedKernel,
+}
+
+impl Kernels {
+    /// The kernels that the options ask for.
+    pub(crate) fn of(options: &FootprintOptions) -> Self {
+        let ending = |truncation| TruncatedKernel::new(options.kernel, truncation);
+        Self {
+            cell: ending(options.truncation),
+            overlap: ending(options.overlap_truncation),
+        }
+    }
+
+    /// The kernel of photons whose footprints lie so among others.
+    #[inline]
+    pub(crate) fn get(self, coverage: Coverage) -> TruncatedKernel {
+        if coverage == Coverage::Overlap {
+            self.overlap
+        } else {
+            self.cell
+        }
+    }
+
+    /// How far the blur of a pixel may carry light, relative to the pixel's edges.
+    pub(crate) fn blur_reach(self) -> f32 {
+        let farthest = self.cell.search_reach().max(self.overlap.search_reach());
+        farthest * self.cell.shape.pixel_variance().sqrt()
+    }
+}
 
 /// A kernel and where it ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,13 +57,13 @@ pub(crate) struct TruncatedKernel {
 }
 
 impl TruncatedKernel {
-    /// The kernel that the options ask for.
-    pub(crate) fn of(options: &FootprintOptions) -> Self {
+    /// A kernel that ends, if it is a Gaussian, at so many standard deviations.
+    fn new(shape: FootprintKernel, truncation: f32) -> Self {
         // In f64, so that the quotient is one for three standard deviations on any machine.
-        let within = 1.0 - (-0.5 * f64::from(options.truncation).powi(2)).exp();
+        let within = 1.0 - (-0.5 * f64::from(truncation).powi(2)).exp();
         Self {
-            shape: options.kernel,
-            truncation: options.truncation,
+            shape,
+            truncation,
             peak: PEAK_AT_THREE * (WITHIN_THREE / within) as f32,
         }
     }
@@ -116,10 +152,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn gaussian(truncation: f32) -> TruncatedKernel {
-        TruncatedKernel::of(&FootprintOptions {
-            truncation,
-            ..FootprintOptions::default()
-        })
+        TruncatedKernel::new(FootprintKernel::Gaussian, truncation)
     }
 
     /// The kernel's integral over rings of equal width, by the midpoint rule in f64.

@@ -20,6 +20,7 @@ fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
         object: 0,
         events: 1,
         source: caustics_trace::FootprintSource::Differential,
+        coverage: caustics_trace::Coverage::Cell,
     }
 }
 
@@ -289,6 +290,7 @@ fn a_sphere_is_lit_by_its_own_slope() {
                 object: 0,
                 events: 1,
                 source: caustics_trace::FootprintSource::Differential,
+                coverage: caustics_trace::Coverage::Cell,
             });
         }
     }

@@ -1,10 +1,11 @@
 //! Gaussian footprints that end at any number of standard deviations: their flux, and where it falls.
 
 use caustics_accel::BvhOptions;
+use caustics_filter::Image;
 use caustics_geometry::shapes;
 use caustics_render::{FootprintGather, FootprintOptions, GBuffer, RenderError, splat};
 use caustics_scene::{Camera, Instance, Material, Projection, Scene, Shape, World};
-use caustics_trace::Photon;
+use caustics_trace::{Coverage, Photon};
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use proptest::prelude::*;
 use std::f32::consts::PI;
@@ -14,7 +15,7 @@ const ALBEDO: f32 = 0.5;
 const PIXELS: u32 = 128;
 const PIXEL: f32 = 2.0 / PIXELS as f32;
 
-fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
+fn photon(position: Vec3, axes: [Vec3; 2], coverage: Coverage) -> Photon {
     Photon {
         position,
         incoming: Vec3::new(0.2, -1.0, -0.1).normalize(),
@@ -24,13 +25,24 @@ fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
         object: 0,
         events: 1,
         source: caustics_trace::FootprintSource::Differential,
+        coverage,
     }
 }
 
-fn truncated(truncation: f32) -> FootprintOptions {
-    FootprintOptions {
-        truncation,
-        ..FootprintOptions::default()
+const COVERAGES: [Coverage; 2] = [Coverage::Cell, Coverage::Overlap];
+
+/// Photons of one coverage end at a truncation, those of the other where they do by default.
+fn truncated(coverage: Coverage, truncation: f32) -> FootprintOptions {
+    let default = FootprintOptions::default();
+    match coverage {
+        Coverage::Overlap => FootprintOptions {
+            overlap_truncation: truncation,
+            ..default
+        },
+        _ => FootprintOptions {
+            truncation,
+            ..default
+        },
     }
 }
 
@@ -55,19 +67,20 @@ fn floor() -> GBuffer {
 }
 
 /// Photons all over the middle of the floor, none at the same place of its pixel as another.
-fn spread(axes: [Vec3; 2]) -> Vec<Photon> {
+fn spread(axes: [Vec3; 2], coverage: Coverage) -> Vec<Photon> {
     (0..1000)
         .map(|index| {
             // The generalised golden ratio's multiples.
             let place = (index as f32 * Vec2::new(0.754_877_7, 0.569_840_3)).fract() - 0.5;
-            photon(Vec3::new(place.x, 0.0, place.y), axes)
+            photon(Vec3::new(place.x, 0.0, place.y), axes, coverage)
         })
         .collect()
 }
 
 /// The flux of a picture of the floor over that of its photons.
 fn drawn(buffer: &GBuffer, photons: &[Photon], truncation: f32) -> f64 {
-    let (image, stats) = splat(buffer, photons, &truncated(truncation)).expect("valid");
+    let options = truncated(photons[0].coverage, truncation);
+    let (image, stats) = splat(buffer, photons, &options).expect("valid");
     assert_eq!(stats.splatted, photons.len() as u64);
     let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel[0])).sum();
     let flux = sum * f64::from(PI / ALBEDO) * f64::from(PIXEL).powi(2);
@@ -75,11 +88,12 @@ fn drawn(buffer: &GBuffer, photons: &[Photon], truncation: f32) -> f64 {
 }
 
 /// The flux that a gather finds on the floor over that of its one photon, by rings in f64.
-fn gathered(axes: [Vec3; 2], truncation: f32) -> f64 {
+fn gathered(axes: [Vec3; 2], coverage: Coverage, truncation: f32) -> f64 {
     const RINGS: u32 = 400;
     const ANGLES: u32 = 64;
-    let options = truncated(truncation);
-    let gather = FootprintGather::new(&[photon(Vec3::ZERO, axes)], &options).expect("valid");
+    let options = truncated(coverage, truncation);
+    let photons = [photon(Vec3::ZERO, axes, coverage)];
+    let gather = FootprintGather::new(&photons, &options).expect("valid");
     // In coordinates along the axes the footprint is round.
     let area = f64::from(axes[0].cross(axes[1]).length()) * f64::from(options.scale).powi(2);
     let width = f64::from(truncation) / f64::from(RINGS);
@@ -106,9 +120,10 @@ proptest! {
         long in 0.01f32..1.0,
         ratio in 0.1f32..1.0,
         slant in -0.5f32..0.5,
+        coverage in prop::sample::select(&COVERAGES[..]),
     ) {
         let axes = [long * Vec3::X, ratio * long * Vec3::new(slant, 0.0, 1.0)];
-        let found = gathered(axes, truncation);
+        let found = gathered(axes, coverage, truncation);
         prop_assert!((found - 1.0).abs() < 2e-5, "{found}");
     }
 
@@ -119,22 +134,37 @@ proptest! {
         long in 2.0f32..8.0,
         ratio in 0.5f32..1.0,
         slant in -0.5f32..0.5,
+        coverage in prop::sample::select(&COVERAGES[..]),
     ) {
         let axes = [long * PIXEL * Vec3::X, ratio * long * PIXEL * Vec3::new(slant, 0.0, 1.0)];
-        let found = drawn(&floor(), &spread(axes), truncation);
+        let found = drawn(&floor(), &spread(axes, coverage), truncation);
         prop_assert!((found - 1.0).abs() < 3e-3, "{found}");
+    }
+}
+
+/// Footprints that overlap are read at the pixels' middles down to a third of a pixel, but not where
+/// they would end before the nearest one.
+#[test]
+fn small_footprints_that_overlap_keep_the_flux() {
+    for truncation in [1.0, 1.5, 2.0, 3.0] {
+        for long in [0.1, 0.5, 0.7, 1.0, 1.4] {
+            let axes = [long * PIXEL * Vec3::X, long * PIXEL * Vec3::Z];
+            let found = drawn(&floor(), &spread(axes, Coverage::Overlap), truncation);
+            assert!((found - 1.0).abs() < 1e-4, "{truncation} {long}: {found}");
+        }
     }
 }
 
 /// Control: a flux that is wrong by a hundredth is noticed.
 #[test]
 fn control_too_much_flux_is_noticed() {
-    let mut photons = spread([4.0 * PIXEL * Vec3::X, 4.0 * PIXEL * Vec3::Z]);
+    let axes = [4.0 * PIXEL * Vec3::X, 4.0 * PIXEL * Vec3::Z];
+    let mut photons = spread(axes, Coverage::Cell);
     let right = drawn(&floor(), &photons, 2.0);
     for photon in &mut photons {
         photon.flux *= 1.01;
     }
-    let (image, _) = splat(&floor(), &photons, &truncated(2.0)).expect("valid");
+    let (image, _) = splat(&floor(), &photons, &truncated(Coverage::Cell, 2.0)).expect("valid");
     let sum: f64 = image.pixels().iter().map(|pixel| f64::from(pixel[0])).sum();
     let bright = sum * f64::from(PI / ALBEDO * PIXEL * PIXEL) / f64::from(1000.0 * FLUX);
     assert!((right - 1.0).abs() < 3e-3 && (bright - 1.0).abs() > 3e-3);
@@ -144,10 +174,11 @@ fn control_too_much_flux_is_noticed() {
 fn pixels_beyond_the_end_are_dark() {
     let axes = [20.0 * PIXEL * Vec3::X, 20.0 * PIXEL * Vec3::Z];
     let buffer = floor();
-    let lit = |truncation| {
-        let photons = [photon(Vec3::ZERO, axes)];
-        let gather = FootprintGather::new(&photons, &truncated(truncation)).expect("valid");
-        let (image, _) = splat(&buffer, &photons, &truncated(truncation)).expect("valid");
+    let lit = |coverage, truncation| {
+        let photons = [photon(Vec3::ZERO, axes, coverage)];
+        let options = truncated(coverage, truncation);
+        let gather = FootprintGather::new(&photons, &options).expect("valid");
+        let (image, _) = splat(&buffer, &photons, &options).expect("valid");
         // Within a standard deviation of 11 pixels, along a row through the middle.
         let row = &image.pixels()[(PIXELS / 2 * PIXELS) as usize..][..PIXELS as usize];
         let drawn = row.iter().filter(|pixel| pixel[0] > 0.0).count() as f32;
@@ -162,24 +193,72 @@ fn pixels_beyond_the_end_are_dark() {
             looked_up as f32 / 1000.0 / (11.0 * PIXEL),
         )
     };
-    for truncation in [1.0, 2.0, 3.0, 4.0] {
-        let (drawn, looked_up) = lit(truncation);
-        assert!((looked_up - truncation).abs() < 0.02, "{looked_up}");
-        // A level's pixels are four wide here, and interpolated.
-        assert!((drawn - truncation).abs() < 0.8, "{truncation}: {drawn}");
+    // A level's pixels are four wide here, and interpolated; or eight.
+    for (coverage, level_pixel) in [(Coverage::Cell, 0.8), (Coverage::Overlap, 1.1)] {
+        for truncation in [1.0, 2.0, 3.0, 4.0] {
+            let (drawn, looked_up) = lit(coverage, truncation);
+            println!("{coverage:?} {truncation} {drawn} {looked_up}");
+            assert!((looked_up - truncation).abs() < 0.02, "{looked_up}");
+            assert!(
+                (drawn - truncation).abs() < level_pixel,
+                "{coverage:?} {truncation}: {drawn}"
+            );
+        }
+    }
+}
+
+/// How far a picture is from another, relative to it, over all pixels.
+fn difference(found: &Image, expected: &Image) -> f64 {
+    let (mut off, mut all) = (0.0, 0.0);
+    for (found, expected) in found.pixels().iter().zip(expected.pixels()) {
+        off += f64::from(found[0] - expected[0]).powi(2);
+        all += f64::from(expected[0]).powi(2);
+    }
+    (off / all).sqrt()
+}
+
+/// Overlapping footprints are drawn where pixels are wider than they may be for others, and made
+/// narrower by what the interpolation between those pixels adds.
+#[test]
+fn overlapping_footprints_sum_to_what_others_do() {
+    let buffer = floor();
+    let picture = |spacing: f32, coverage| {
+        let axes = [spacing * PIXEL * Vec3::X, 0.8 * spacing * PIXEL * Vec3::Z];
+        let photons = spread(axes, coverage);
+        let options = truncated(coverage, 3.0);
+        splat(&buffer, &photons, &options).expect("valid").0
+    };
+    // Those of others that are narrower are integrated over pixels.
+    for spacing in [2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 16.0, 24.0] {
+        let (cells, overlaps) = (
+            picture(spacing, Coverage::Cell),
+            picture(spacing, Coverage::Overlap),
+        );
+        let off = difference(&overlaps, &cells);
+        let wider = difference(&picture(1.1 * spacing, Coverage::Overlap), &cells);
+        println!("{spacing} {off:.5} {wider:.5}");
+        assert!(off < 0.01, "{spacing}: {off}");
+        // Control: a tenth more width is told apart.
+        assert!(wider > 2.0 * off, "{spacing}: {wider}");
     }
 }
 
 #[test]
 fn a_truncation_out_of_range_is_refused() {
     for truncation in [1.0, 4.0] {
-        assert_eq!(truncated(truncation).validate(), Ok(()));
+        for coverage in COVERAGES {
+            assert_eq!(truncated(coverage, truncation).validate(), Ok(()));
+        }
     }
     for truncation in [0.999, 4.001, -3.0, f32::INFINITY] {
-        let error = RenderError::InvalidTruncation { truncation };
-        assert_eq!(truncated(truncation).validate(), Err(error.clone()));
-        let gather = FootprintGather::new(&[], &truncated(truncation));
-        assert_eq!(gather.err(), Some(error));
+        for coverage in COVERAGES {
+            let error = RenderError::InvalidTruncation { truncation };
+            let options = truncated(coverage, truncation);
+            assert_eq!(options.validate(), Err(error.clone()));
+            let gather = FootprintGather::new(&[], &options);
+            assert_eq!(gather.err(), Some(error));
+        }
     }
-    assert!(truncated(f32::NAN).validate().is_err());
+    assert!(truncated(Coverage::Cell, f32::NAN).validate().is_err());
+    assert!(truncated(Coverage::Overlap, f32::NAN).validate().is_err());
 }

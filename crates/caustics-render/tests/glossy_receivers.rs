@@ -56,6 +56,7 @@ impl Floor {
                     object: 0,
                     events: 1,
                     source: caustics_trace::FootprintSource::Differential,
+                    coverage: caustics_trace::Coverage::Cell,
                 }
             })
             .collect();

@@ -95,6 +95,7 @@ fn photon(position: Vec3, incoming: Vec3, spacing: f32, object: u32) -> Photon {
         object,
         events: 1,
         source: caustics_trace::FootprintSource::Differential,
+        coverage: caustics_trace::Coverage::Cell,
     }
 }
 

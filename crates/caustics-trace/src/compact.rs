@@ -24,10 +24,10 @@ const LAST_EXPONENT: i32 = 31;
 /// strongest channel of the flux changes by 0.2 % at most and the others by as much of the
 /// strongest; below 2^-28 W the steps stay as they are there, so
 /// that 2^-37 W vanishes, and what is above 15.9 W is cut. The object and the number of events are
-/// not kept.
+/// not kept, nor what the photon says of its footprint.
 ///
 /// ```
-/// use caustics_trace::{CompactPhoton, FootprintSource, Photon, glam::Vec3};
+/// use caustics_trace::{CompactPhoton, Coverage, FootprintSource, Photon, glam::Vec3};
 ///
 /// let photon = Photon {
 ///     position: Vec3::new(1.0, 2.0, 3.0),
@@ -38,6 +38,7 @@ const LAST_EXPONENT: i32 = 31;
 ///     object: 0,
 ///     events: 2,
 ///     source: FootprintSource::Checked,
+///     coverage: Coverage::Cell,
 /// };
 /// let compact = CompactPhoton::from(&photon);
 /// assert_eq!(size_of_val(&compact), 20);

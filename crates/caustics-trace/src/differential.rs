@@ -1,5 +1,7 @@
 use glam::Vec3;
 
+use crate::photon::Coverage;
+
 /// Which part of the width of all that blurs a photon's light, as the places on an area light do, the
 /// third and fourth parameters of its differential stand for: their derivatives of the direction are
 /// [`bounded`](RayDifferential::bounded) as those of a step are, and a whole light may turn it by more.
@@ -149,7 +151,15 @@ impl<const N: usize> RayDifferential<N> {
         }
     }
 
-    /// Two axes, in metres, of a photon's footprint in the plane with unit `normal`.
+    /// Two axes, in metres, of a photon's footprint in the plane with unit `normal`: those of
+    /// [`footprint`](Self::footprint).
+    #[must_use]
+    pub fn footprint_axes(&self, normal: Vec3) -> [Vec3; 2] {
+        self.footprint(normal).0
+    }
+
+    /// Two axes, in metres, of a photon's footprint in the plane with unit `normal`, and how it lies
+    /// among its neighbours'.
     ///
     /// With two parameters these are the displacements. With four, the first two step to a photon's
     /// neighbours in a lattice and the others go along a part, [`BLUR_EDGE`], of all that blurs its
@@ -163,10 +173,14 @@ impl<const N: usize> RayDifferential<N> {
     /// Under a square lamp over a glass sphere round footprints had a quarter of the error of such as
     /// keep the shape of steps and blur, each at its own best factor, and 0.375 was near the best of
     /// factors from 0.2 to 0.8, at 65,536 and 262,144 photons.
+    ///
+    /// Where an eighth of the blur is at least as wide as a step, `b >= 64 a`, the footprint covers four
+    /// steps or more: it [overlaps](Coverage::Overlap) others. Under a narrower lamp, or few photons, the
+    /// lattice would still show, and it is a [`Cell`](Coverage::Cell), as all with two parameters are.
     #[must_use]
-    pub fn footprint_axes(&self, normal: Vec3) -> [Vec3; 2] {
+    pub fn footprint(&self, normal: Vec3) -> ([Vec3; 2], Coverage) {
         if let [first, second] = self.position[..] {
-            return [first, second];
+            return ([first, second], Coverage::Cell);
         }
         // Scaled by the largest: its square overflows long before it does.
         let scale = self
@@ -174,7 +188,7 @@ impl<const N: usize> RayDifferential<N> {
             .iter()
             .fold(0.0f32, |a, it| a.max(it.abs().max_element()));
         if scale == 0.0 {
-            return [Vec3::ZERO; 2];
+            return ([Vec3::ZERO; 2], Coverage::Cell);
         }
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let moved = |i: usize| self.position.get(i).map_or(Vec3::ZERO, |it| *it / scale);
@@ -184,7 +198,13 @@ impl<const N: usize> RayDifferential<N> {
         };
         let steps = [moved(0), moved(1)];
         let step = area(steps[0], steps[1]);
-        let overlap = OVERLAP * (step * area(moved(2), moved(3))).sqrt();
+        let blur = area(moved(2), moved(3));
+        let overlap = OVERLAP * (step * blur).sqrt();
+        let coverage = if blur >= step && step > 0.0 {
+            Coverage::Overlap
+        } else {
+            Coverage::Cell
+        };
         // How much of the steps' own shape is left.
         let covered = step + overlap;
         let own = if covered > 0.0 { step / covered } else { 1.0 };
@@ -200,10 +220,11 @@ impl<const N: usize> RayDifferential<N> {
         let x = xx.sqrt();
         let shear = if x > 0.0 { xy / x } else { 0.0 };
         let y = (yy - shear * shear).max(0.0).sqrt();
-        [
+        let axes = [
             scale * (x * tangent + shear * bitangent),
             scale * y * bitangent,
-        ]
+        ];
+        (axes, coverage)
     }
 }
 
@@ -287,5 +308,30 @@ mod tests {
         assert_relative_eq!(one.max(other) / one.min(other), 1.0, epsilon = 0.01);
         // Steps that go nowhere say nothing.
         assert_eq!(area(axes(0.0, 0.0)), 0.0);
+    }
+
+    #[test]
+    fn footprints_overlap_from_four_steps_on() {
+        let found = |step: f32, blur: f32| {
+            let spread = RayDifferential::<4> {
+                position: [
+                    step * Vec3::X,
+                    step * Vec3::Z,
+                    blur * Vec3::X,
+                    blur * Vec3::Z,
+                ],
+                ..RayDifferential::ZERO
+            };
+            let (axes, coverage) = spread.footprint(Vec3::Y);
+            (axes[0].cross(axes[1]).length() / step.powi(2), coverage)
+        };
+        let (area, coverage) = found(2.0, 2.001);
+        assert_relative_eq!(area, 4.0, max_relative = 1e-3);
+        assert_eq!(coverage, Coverage::Overlap);
+        assert_eq!(found(2.0, 1.999).1, Coverage::Cell);
+        assert_eq!(found(2.0, 0.0).1, Coverage::Cell);
+        assert_eq!(found(0.0, 1.0).1, Coverage::Cell);
+        // Without any blur there is nothing but the lattice.
+        assert_eq!(downwards().footprint(Vec3::Y).1, Coverage::Cell);
     }
 }

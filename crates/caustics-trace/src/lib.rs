@@ -166,7 +166,7 @@ pub use optics::{
     refract,
 };
 pub use options::{Aim, Branching, TraceError, TraceOptions};
-pub use photon::{FootprintSource, Photon, PhotonMap};
+pub use photon::{Coverage, FootprintSource, Photon, PhotonMap};
 pub use plan::{EmissionBatch, EmissionPlan};
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};

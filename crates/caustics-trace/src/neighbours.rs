@@ -268,6 +268,7 @@ mod tests {
             object: 0,
             events: 1,
             source: FootprintSource::Differential,
+            coverage: crate::Coverage::Cell,
         }
     }
 

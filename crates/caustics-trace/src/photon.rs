@@ -24,6 +24,21 @@ pub struct Photon {
     pub events: u32,
     /// How `axes` were found.
     pub source: FootprintSource,
+    /// How its footprint lies among those of other photons.
+    pub coverage: Coverage,
+}
+
+/// How the footprints of neighbouring photons lie to each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Coverage {
+    /// Side by side, as the cells of a lattice: they have to join without a seam.
+    #[default]
+    Cell,
+    /// One over the other: lights with an area, and skies, send photons from places of all their width,
+    /// so that a footprint covers at least four steps of the lattice and no seam between two shows. See
+    /// [`RayDifferential::footprint`](crate::RayDifferential::footprint).
+    Overlap,
 }
 
 /// How a photon's footprint was found.

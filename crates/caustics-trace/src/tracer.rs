@@ -256,15 +256,17 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         }
         self.ledger.book(Fate::Stored, branch.flux);
         let side = if point.from_outside { 1.0 } else { -1.0 };
+        let (axes, coverage) = branch.differential.footprint(point.geometric_normal);
         self.photons.push(Photon {
             position: point.spawn.position,
             incoming: branch.ray.direction,
             flux: branch.flux,
             normal: side * point.geometric_normal,
-            axes: branch.differential.footprint_axes(point.geometric_normal),
+            axes,
             object: point.object,
             events: branch.events,
             source: branch.source,
+            coverage,
         });
         self.paths.push(branch.path);
     }

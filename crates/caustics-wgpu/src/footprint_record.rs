@@ -1,5 +1,5 @@
 use bytemuck::{Pod, Zeroable};
-use caustics_trace::Photon;
+use caustics_trace::{Coverage, Photon};
 use glam::Vec3;
 
 /// A [`Photon`] as buffers of the GPU hold it: five rows of 16 bytes.
@@ -23,7 +23,8 @@ pub struct FootprintRecord {
     pub flux_b: f32,
     /// Unit direction in which it travelled.
     pub incoming: [f32; 3],
-    /// Index of the receiver among the world's objects.
+    /// Index of the receiver among the world's objects, plus [`OVERLAP`](Self::OVERLAP) if the footprint
+    /// overlaps others: [`receiver`](Self::receiver) and [`coverage`](Self::coverage) tell them apart.
     pub object: u32,
     /// Unit geometric normal of the receiver, on the side on which the photon landed.
     pub normal: [f32; 3],
@@ -34,6 +35,25 @@ pub struct FootprintRecord {
 }
 
 impl FootprintRecord {
+    /// What is added to the object of a photon whose footprint is a [`Coverage::Overlap`].
+    pub const OVERLAP: u32 = 1 << 31;
+
+    /// Index of the receiver among the world's objects.
+    #[must_use]
+    pub fn receiver(&self) -> u32 {
+        self.object & !Self::OVERLAP
+    }
+
+    /// How the footprint lies among those of other photons.
+    #[must_use]
+    pub fn coverage(&self) -> Coverage {
+        if self.object & Self::OVERLAP == 0 {
+            Coverage::Cell
+        } else {
+            Coverage::Overlap
+        }
+    }
+
     /// The flux in watts, for each channel.
     #[must_use]
     pub fn flux(&self) -> Vec3 {
@@ -43,6 +63,10 @@ impl FootprintRecord {
     /// The record of a photon whose emission has this number.
     #[must_use]
     pub fn numbered(photon: &Photon, number: u32) -> Self {
+        let overlap = match photon.coverage {
+            Coverage::Overlap => Self::OVERLAP,
+            _ => 0,
+        };
         Self {
             position: photon.position.to_array(),
             flux_r: photon.flux.x,
@@ -51,7 +75,7 @@ impl FootprintRecord {
             axis_v: photon.axes[1].to_array(),
             flux_b: photon.flux.z,
             incoming: photon.incoming.to_array(),
-            object: photon.object,
+            object: photon.object | overlap,
             normal: photon.normal.to_array(),
             photon: number,
         }
@@ -80,6 +104,7 @@ mod tests {
             object: 7,
             events: 2,
             source: caustics_trace::FootprintSource::Differential,
+            coverage: caustics_trace::Coverage::Cell,
         };
         let record = FootprintRecord::numbered(&photon, 8);
         let words: [u32; 20] = bytemuck::cast(record);
@@ -98,5 +123,16 @@ mod tests {
         );
         assert_eq!((words[15], words[19]), (7, 8));
         assert_eq!(record.flux(), photon.flux);
+        assert_eq!((record.receiver(), record.coverage()), (7, Coverage::Cell));
+        let overlapping = Photon {
+            coverage: Coverage::Overlap,
+            ..photon
+        };
+        let record = FootprintRecord::from(&overlapping);
+        assert_eq!(
+            (record.receiver(), record.coverage()),
+            (7, Coverage::Overlap)
+        );
+        assert_eq!(record.object, 0x8000_0007);
     }
 }

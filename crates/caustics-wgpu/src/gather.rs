@@ -66,7 +66,8 @@ struct GatherGrid {
     max_anisotropy: f32,
     least_extent: f32,
     most_extent: f32,
-    truncation: [f32; 2],
+    pad: [f32; 2],
+    truncation: [f32; 4],
 }
 
 /// A point of a surface at which light is asked for, as the GPU's buffers hold it.
@@ -143,7 +144,8 @@ impl Gather {
             },
             least_extent: options.least_extent,
             most_extent: options.most_extent,
-            truncation: truncation::uniform(options.truncation),
+            pad: [0.0; 2],
+            truncation: truncation::uniform(options.truncation, options.overlap_truncation),
         };
         let stages = wgpu::ShaderStages::COMPUTE;
         let kernel = [options.kernel.constant()];
@@ -354,6 +356,7 @@ mod tests {
                 max_anisotropy,
                 least_extent,
                 most_extent,
+                pad,
                 truncation,
             }
         );

@@ -12,6 +12,9 @@ pub struct GatherOptions {
     /// Where the Gaussian kernel ends, in standard deviations: 1 to 4. What would lie beyond is
     /// shared out over the rest, so that no flux is lost. Other kernels end where they must.
     pub truncation: f32,
+    /// The same for photons that [overlap](caustics_trace::Coverage::Overlap), as those of lights with
+    /// an area do by the dozen.
+    pub overlap_truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at least
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
@@ -35,6 +38,7 @@ impl Default for GatherOptions {
             kernel: SplatKernel::default(),
             scale: 0.55,
             truncation: 3.0,
+            overlap_truncation: 2.0,
             max_anisotropy: f32::INFINITY,
             least_extent: 1e-5,
             most_extent: 1e3,
@@ -63,6 +67,12 @@ impl GatherOptions {
                 "truncation",
                 self.truncation,
                 truncation::RANGE.contains(&self.truncation),
+                "1 to 4",
+            ),
+            (
+                "overlap_truncation",
+                self.overlap_truncation,
+                truncation::RANGE.contains(&self.overlap_truncation),
                 "1 to 4",
             ),
             (

@@ -4,7 +4,7 @@
 //! render passes into the host's encoder, and submits, polls and presents nothing.
 //!
 //! ```
-//! use caustics_trace::{FootprintSource, Photon};
+//! use caustics_trace::{Coverage, FootprintSource, Photon};
 //! use caustics_wgpu::FootprintRecord;
 //! use caustics_wgpu::glam::Vec3;
 //!
@@ -18,6 +18,7 @@
 //!     object: 7,
 //!     events: 2,
 //!     source: FootprintSource::Differential,
+//!     coverage: Coverage::Cell,
 //! };
 //! let record = FootprintRecord::from(&photon);
 //! assert_eq!(record.flux(), photon.flux);

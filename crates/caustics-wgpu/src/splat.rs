@@ -301,6 +301,7 @@ mod tests {
                 has_objects,
                 integrate_pixels,
                 surrounding_levels,
+                pad,
                 truncation,
                 levels,
                 surroundings,

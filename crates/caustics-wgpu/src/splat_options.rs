@@ -53,6 +53,9 @@ pub struct SplatOptions {
     /// shared out over the rest, so that no flux is lost. Other kernels end where they must, and
     /// footprints that are [integrated over pixels](Self::integrate_pixels) always at 3.
     pub truncation: f32,
+    /// The same for photons that [overlap](caustics_trace::Coverage::Overlap), as those of lights with
+    /// an area do by the dozen.
+    pub overlap_truncation: f32,
     /// The longer axis may be at most this many times the shorter one, which is widened; at least
     /// 1, and infinite for no limit.
     pub max_anisotropy: f32,
@@ -80,6 +83,7 @@ impl Default for SplatOptions {
             kernel: SplatKernel::default(),
             scale: 0.55,
             truncation: 3.0,
+            overlap_truncation: 2.0,
             max_anisotropy: f32::INFINITY,
             integrate_pixels: true,
             pairs_per_footprint: 8,
@@ -106,6 +110,12 @@ impl SplatOptions {
                 "truncation",
                 self.truncation,
                 truncation::RANGE.contains(&self.truncation),
+                "1 to 4",
+            ),
+            (
+                "overlap_truncation",
+                self.overlap_truncation,
+                truncation::RANGE.contains(&self.overlap_truncation),
                 "1 to 4",
             ),
             (

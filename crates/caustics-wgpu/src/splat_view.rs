@@ -42,7 +42,8 @@ pub(crate) struct SplatView {
     pub(crate) has_objects: u32,
     pub(crate) integrate_pixels: u32,
     pub(crate) surrounding_levels: u32,
-    pub(crate) truncation: [f32; 2],
+    pub(crate) pad: [u32; 2],
+    pub(crate) truncation: [f32; 4],
     pub(crate) levels: [[u32; 4]; 8],
     pub(crate) surroundings: [[u32; 4]; SURROUNDING_LEVELS],
 }

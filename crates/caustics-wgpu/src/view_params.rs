@@ -109,7 +109,8 @@ impl<'a> ViewParams<'a> {
             has_objects: u32::from(self.objects.is_some()),
             integrate_pixels: u32::from(options.integrates_pixels()),
             surrounding_levels: surroundings.count,
-            truncation: truncation::uniform(options.truncation),
+            pad: [0; 2],
+            truncation: truncation::uniform(options.truncation, options.overlap_truncation),
             levels,
             surroundings: surroundings.levels,
         })

@@ -10,6 +10,11 @@ use caustics_wgpu::{
 };
 use stage::{Stage, TestError, device_with, upload};
 
+/// Another truncation, which light from an area ends at.
+fn overlap_truncation(truncation: f32) -> f32 {
+    5.0 - truncation
+}
+
 #[test]
 fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
     let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
@@ -21,18 +26,22 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         .map(|name| (name, gaussian, its_twin, 3.0))
         .into_iter()
         .chain(kernels.map(|(kernel, twin)| ("p01_sphere", kernel, twin, 3.0)))
-        .chain([1.5, 4.0].map(|truncation| ("p01_sphere", gaussian, its_twin, truncation)));
+        .chain([1.5, 4.0].map(|truncation| ("p01_sphere", gaussian, its_twin, truncation)))
+        // An area light's, whose footprints have a truncation of their own.
+        .chain([1.5, 3.0].map(|truncation| ("p09_cornell", gaussian, its_twin, truncation)));
     for (name, kernel, twin, truncation) in cases {
         let stage = Stage::load(name, 10_000)?;
         let options = FootprintOptions {
             kernel: twin,
             truncation,
+            overlap_truncation: overlap_truncation(truncation),
             ..FootprintOptions::default()
         };
         let expected = FootprintGather::new(&stage.photons, &options)?;
         let options = GatherOptions {
             kernel,
             truncation,
+            overlap_truncation: overlap_truncation(truncation),
             least_extent: expected.least_extent(),
             most_extent: 1e7 * expected.least_extent(),
             capacity: stage.photons.len() as u32,

@@ -47,6 +47,7 @@ fn photon(x: f32, z: f32, size: f32, flux: f32) -> Photon {
         object: 0,
         events: 1,
         source: caustics_trace::FootprintSource::Differential,
+        coverage: caustics_trace::Coverage::Cell,
     }
 }
 
@@ -102,6 +103,40 @@ fn a_footprint_deposits_its_flux_whatever_its_size() -> Result<(), TestError> {
                     "{method:?} {kernel:?} {size}: {found}"
                 );
             }
+        }
+    }
+    Ok(())
+}
+
+/// They end sooner, and are drawn where pixels are wider: each for itself is off by some percent, by
+/// where in its pixel it is, and all together are not.
+#[test]
+fn footprints_that_overlap_keep_their_flux() -> Result<(), TestError> {
+    let picture = floor()?;
+    for (features, method, tolerance) in ways() {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        let options = options(method, SplatKernel::Gaussian);
+        for size in [1e-3, 0.01, 0.02, 0.04, 0.08] {
+            let photons: Vec<Photon> = (0..1000)
+                .map(|index| {
+                    // The generalised golden ratio's multiples.
+                    let place = |step: f32| 0.3 + 0.4 * (index as f32 * step).fract();
+                    Photon {
+                        coverage: caustics_trace::Coverage::Overlap,
+                        ..photon(place(0.754_877_7), place(0.569_840_3), size, 2.0)
+                    }
+                })
+                .collect();
+            let (found, stats) = irradiance(&device, &queue, &options, &picture, &[&photons])?;
+            assert_eq!(stats.splatted, 1000);
+            let found = flux(&found) / 2000.0;
+            println!("{method:?} {size} {found}");
+            assert!(
+                (found - 1.0).abs() < 0.3 * tolerance,
+                "{method:?} {size}: {found}"
+            );
         }
     }
     Ok(())

@@ -210,35 +210,38 @@ fn every_truncation_draws_the_picture_of_the_cpu() -> Result<(), TestError> {
         let Some((device, queue)) = device_with(features) else {
             return Ok(());
         };
-        let stage = Stage::load("p03_cognac", 20_000)?;
-        let picture = stage.picture(&stage.camera, SIZE);
-        let default = stage.splat(&picture, &read_at_middles)?;
-        for truncation in [1.5, 2.65, 4.0] {
-            let options = FootprintOptions {
-                truncation,
-                ..read_at_middles
-            };
-            let expected = stage.splat(&picture, &options)?;
-            let splat = SplatOptions {
-                truncation,
-                ..splat
-            };
-            let options = with(splat);
-            let (found, _) = irradiance(&device, &queue, &options, &picture, &[&stage.photons])?;
-            let found = picture.radiance(&found);
-            let (off, wrong) = differences(&picture, &found, &expected);
-            let (from_default, _) = differences(&picture, &found, &default);
-            println!(
-                "{:?} {truncation}: off by {off:.2e}, {wrong:.2e} of the pixels, \
-                 from the default {from_default:.2e}",
-                splat.method
-            );
-            assert!(
-                off < OFF,
-                "{truncation}: off by {off}, {wrong} of the pixels"
-            );
-            // Control: the pictures can be told from the default's.
-            assert!(from_default > 2.0 * OFF, "{truncation}: {from_default}");
+        // Footprints of a light without an area, and of one with an area, which overlap.
+        for (name, overlap) in [("p03_cognac", false), ("p09_cornell", true)] {
+            let stage = Stage::load(name, 20_000)?;
+            let picture = stage.picture(&stage.camera, SIZE);
+            let default = stage.splat(&picture, &read_at_middles)?;
+            for end in [1.5, 2.65, 4.0] {
+                let mut options = read_at_middles;
+                let mut splat = splat;
+                if overlap {
+                    (options.overlap_truncation, splat.overlap_truncation) = (end, end);
+                } else {
+                    (options.truncation, splat.truncation) = (end, end);
+                }
+                let expected = stage.splat(&picture, &options)?;
+                let options = with(splat);
+                let photons = [&stage.photons[..]];
+                let (found, _) = irradiance(&device, &queue, &options, &picture, &photons)?;
+                let found = picture.radiance(&found);
+                let (off, wrong) = differences(&picture, &found, &expected);
+                let (from_default, _) = differences(&picture, &found, &default);
+                println!(
+                    "{name} {:?} {end}: off by {off:.2e}, {wrong:.2e} of the pixels, \
+                     from the default {from_default:.2e}",
+                    splat.method
+                );
+                assert!(
+                    off < OFF,
+                    "{name} {end}: off by {off}, {wrong} of the pixels"
+                );
+                // Control: the pictures can be told from the default's.
+                assert!(from_default > 2.0 * OFF, "{name} {end}: {from_default}");
+            }
         }
     }
     Ok(())

@@ -26,6 +26,7 @@ struct Density {
     axis_v: vec3<f32>,
     // Flux over area and incident cosine.
     strength: vec3<f32>,
+    truncation: Truncation,
     is_valid: bool,
 }
 
@@ -42,7 +43,7 @@ struct StoredDensity {
     reach: f32,
     strength: vec3<f32>,
     incoming_y: f32,
-    // Index of its receiver among the world's objects.
+    // Index of its receiver among the world's objects, and `DENSITY_OVERLAP_BIT`.
     object: u32,
     before: f32,
     plane_distance: f32,
@@ -51,11 +52,29 @@ struct StoredDensity {
     flat: f32,
 }
 
+// `OVERLAP_BIT` of footprint_record.wgsl, which not all that know densities know.
+const DENSITY_OVERLAP_BIT: u32 = 0x80000000u;
+
+fn object_of(object_and_bit: u32) -> u32 {
+    return object_and_bit & ~DENSITY_OVERLAP_BIT;
+}
+
+fn overlaps(object_and_bit: u32) -> bool {
+    return (object_and_bit & DENSITY_OVERLAP_BIT) != 0u;
+}
+
 // A symmetric matrix in the tangent plane's basis: xx, xy, yy.
 alias Covariance = vec3<f32>;
 
 // Where a Gaussian ends, in standard deviations, and its value in its middle.
 alias Truncation = vec2<f32>;
+
+// The `Truncation` of footprints that lie side by side, then that of those that overlap.
+alias Truncations = vec4<f32>;
+
+fn truncation_of(all: Truncations, object_and_bit: u32) -> Truncation {
+    return select(all.xy, all.zw, overlaps(object_and_bit));
+}
 
 fn is_finite_number(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
@@ -132,10 +151,10 @@ fn kernel_pixel_variance() -> f32 {
     return select(0.25, 1.0 / 12.0, FOOTPRINT_KERNEL == KERNEL_GAUSSIAN);
 }
 
-// The kernel's value in its middle, its largest.
-fn kernel_peak(gaussian: Truncation) -> f32 {
+// The largest value that the kernel of any footprint has.
+fn kernel_peak(gaussians: Truncations) -> f32 {
     switch FOOTPRINT_KERNEL {
-        case 0u: { return gaussian.y; }
+        case 0u: { return max(gaussians.y, gaussians.w); }
         case 1u: { return 0.10610330; }
         case 2u: { return 0.07957747; }
         default: { return 0.16666667; }
@@ -213,8 +232,10 @@ fn density_spread(
     incoming: vec3<f32>,
     flux: vec3<f32>,
     c: Covariance,
+    truncation: Truncation,
 ) -> Density {
     var d: Density;
+    d.truncation = truncation;
     d.center = center;
     d.normal = normal;
     d.incoming = incoming;
@@ -240,14 +261,14 @@ fn density_spread(
 }
 
 // No point farther from the center than this belongs to the footprint.
-fn density_radius(d: Density, gaussian: Truncation) -> f32 {
-    let r = kernel_reach(gaussian);
+fn density_radius(d: Density) -> f32 {
+    let r = kernel_reach(d.truncation);
     return r * sqrt(dot(d.axis_u, d.axis_u) + dot(d.axis_v, d.axis_v));
 }
 
-fn density_reach(d: Density, gaussian: Truncation) -> f32 {
+fn density_reach(d: Density) -> f32 {
     let cosine = -dot(d.incoming, d.normal);
-    return density_radius(d, gaussian) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
+    return density_radius(d) * clamp(MAX_SLIDE * cosine, MIN_INCIDENCE, 1.0);
 }
 
 // The way from a plane towards the light, one metre off the plane.
@@ -295,9 +316,9 @@ fn density_cosine(
 }
 
 // The kernel of a stored density at a point.
-fn density_kernel(stored: StoredDensity, position: vec3<f32>, gaussian: Truncation) -> f32 {
+fn density_kernel(stored: StoredDensity, position: vec3<f32>, gaussians: Truncations) -> f32 {
     let relative = position - stored.center;
     let u = dot(relative, stored.u_gradient);
     let v = dot(relative, stored.v_gradient);
-    return kernel_density(u, v, gaussian);
+    return kernel_density(u, v, truncation_of(gaussians, stored.object));
 }

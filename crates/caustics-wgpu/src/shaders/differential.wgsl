@@ -114,23 +114,30 @@ fn scaled_by(before: Differential, factor: f32) -> Differential {
     return result;
 }
 
-// The axes of the footprint in the plane of `normal`.
-fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2> {
+struct Footprint {
+    axes: array<vec3<f32>, 2>,
+    // Whether it covers four steps or more.
+    is_overlap: bool,
+}
+
+// The footprint in the plane of `normal`.
+fn footprint(at_end: Differential, normal: vec3<f32>) -> Footprint {
     if PARAMETERS == 2u {
-        return array(at_end.position[0], at_end.position[1]);
+        return Footprint(array(at_end.position[0], at_end.position[1]), false);
     }
     var scale = 0.0;
     for (var i = 0u; i < PARAMETERS; i++) {
         scale = max(scale, largest(abs(at_end.position[i])));
     }
     if scale == 0.0 {
-        return array(vec3(0.0), vec3(0.0));
+        return Footprint(array(vec3(0.0), vec3(0.0)), false);
     }
     let tangents = tangents_of(normal);
     var steps = array(at_end.position[0] / scale, at_end.position[1] / scale);
     let step = area_of(steps[0], steps[1]);
-    let overlap = OVERLAP * sqrt(step * area_of(
-        at_end.position[PARAMETERS - 2u] / scale, at_end.position[PARAMETERS - 1u] / scale));
+    let blur = area_of(
+        at_end.position[PARAMETERS - 2u] / scale, at_end.position[PARAMETERS - 1u] / scale);
+    let overlap = OVERLAP * sqrt(step * blur);
     // How much of the steps' own shape is left.
     let covered = step + overlap;
     var own = 1.0;
@@ -156,10 +163,11 @@ fn footprint_axes(at_end: Differential, normal: vec3<f32>) -> array<vec3<f32>, 2
         shear = xy / x;
     }
     let y = sqrt(max(yy - shear * shear, 0.0));
-    return array(
+    let axes = array(
         scale * (x * tangents.first + shear * tangents.second),
         scale * y * tangents.second,
     );
+    return Footprint(axes, blur >= step && step > 0.0);
 }
 
 fn area_of(one: vec3<f32>, other: vec3<f32>) -> f32 {

@@ -1,5 +1,8 @@
 // Light that landed on a receiver. Twin: `FootprintRecord` in footprint_record.rs.
 
+// What is added to the object of a footprint that overlaps others, as those of area lights do.
+const OVERLAP_BIT: u32 = 0x80000000u;
+
 struct FootprintRecord {
     position: vec3<f32>,
     flux_r: f32,
@@ -8,6 +11,7 @@ struct FootprintRecord {
     axis_v: vec3<f32>,
     flux_b: f32,
     incoming: vec3<f32>,
+    // Of the receiver, and `OVERLAP_BIT`.
     object: u32,
     normal: vec3<f32>,
     photon: u32,

@@ -1,6 +1,8 @@
 // Sorts footprints into the lists of a hash grid by counting.
 // CPU twin: `FootprintGather::new` of caustics-render.
 
+const_assert DENSITY_OVERLAP_BIT == OVERLAP_BIT;
+
 @group(0) @binding(0) var<uniform> grid: GatherGrid;
 @group(0) @binding(1) var<storage, read> footprints: array<FootprintRecord>;
 @group(0) @binding(2) var<storage, read> footprint_count: array<u32>;
@@ -19,9 +21,9 @@ struct Cells {
 
 // The cells that the box around what a footprint may light touches.
 fn cells_of(d: Density) -> Cells {
-    let half = kernel_outer_reach(grid.truncation) * sqrt(d.axis_u * d.axis_u + d.axis_v * d.axis_v);
+    let half = kernel_outer_reach(d.truncation) * sqrt(d.axis_u * d.axis_u + d.axis_v * d.axis_v);
     let up = towards_light(d.incoming, d.normal);
-    let reach = density_reach(d, grid.truncation);
+    let reach = density_reach(d);
     let low = -PLANE_DISTANCE * reach * up;
     let high = reach * up;
     // A little more than all, so that no rounding leaves a gap.
@@ -66,7 +68,10 @@ fn density_of(record: FootprintRecord) -> Density {
     let c = covariance_of(record);
     let lack = max(lacking(c), 0.0);
     let widened = c + vec3<f32>(lack, 0.0, lack);
-    return density_spread(record.position, record.normal, record.incoming, flux_of(record), widened);
+    let truncation = truncation_of(grid.truncation, record.object);
+    return density_spread(
+        record.position, record.normal, record.incoming, flux_of(record), widened, truncation,
+    );
 }
 
 // The list of one of the eight corners of the box, unless an earlier one has the same.
@@ -103,7 +108,7 @@ fn gather_count(@builtin(global_invocation_id) id: vec3<u32>) {
     atomicAdd(&counts[2], u32(is_shortened(record)));
     let cells = cells_of(d);
     atomicOr(&counts[6], 1u << cells.size);
-    densities[id.x] = density_store(d, gate_of(density_reach(d, grid.truncation)), record.object);
+    densities[id.x] = density_store(d, gate_of(density_reach(d)), record.object);
     for (var corner = 0u; corner < 8u; corner++) {
         let list = list_of(cells, corner);
         if list != NO_FOOTPRINT {

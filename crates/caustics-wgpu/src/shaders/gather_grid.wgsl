@@ -21,8 +21,9 @@ struct GatherGrid {
     // Bounds of a footprint's standard deviation, in metres.
     least_extent: f32,
     most_extent: f32,
-    // See `Truncation`.
-    truncation: vec2<f32>,
+    pad: vec2<f32>,
+    // See `Truncations`.
+    truncation: vec4<f32>,
 }
 
 fn gather_cell(position: vec3<f32>, edge: f32) -> vec3<i32> {

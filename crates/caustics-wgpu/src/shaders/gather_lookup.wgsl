@@ -36,7 +36,7 @@ fn caustics_irradiance_on(object: u32, position: vec3<f32>, normal: vec3<f32>) -
             let stored = caustics_densities[entry & ((1u << GATHER_SIZE_SHIFT) - 1u)];
             let incoming = stored_incoming(stored);
             let plane = decode_octahedral(stored.normal);
-            let is_own = object == CAUSTICS_ANY_OBJECT || object == stored.object;
+            let is_own = object == CAUSTICS_ANY_OBJECT || object == object_of(stored.object);
             let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
             if cosine > 0.0 {
                 let kernel = density_kernel(stored, position, caustics_grid.truncation);

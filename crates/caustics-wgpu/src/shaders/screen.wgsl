@@ -44,8 +44,8 @@ fn pixel_axes(point: vec3<f32>, normal: vec3<f32>) -> PixelAxes {
 
 // Of what a footprint lights between two heights before its plane.
 fn bounds_of(d: Density, heights: vec2<f32>) -> Bounds {
-    let a = kernel_reach(view.truncation) * d.axis_u;
-    let b = kernel_reach(view.truncation) * d.axis_v;
+    let a = kernel_reach(d.truncation) * d.axis_u;
+    let b = kernel_reach(d.truncation) * d.axis_v;
     let up = towards_light(d.incoming, d.normal);
     let near = 0.3 * abs(project(d.center).z);
     var bounds = Bounds(vec2<f32>(1e30), vec2<f32>(-1e30), true);

@@ -33,7 +33,7 @@ fn splat_count(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = places[id.x];
     let level = view.levels[place.level];
     let rows = tile_rows(place);
-    let cut = kernel_cut(view.truncation);
+    let cut = kernel_cut(truncation_of(view.truncation, densities[id.x].object));
     for (var row = rows.x; row < rows.y; row++) {
         let columns = tile_columns(place, row, cut);
         for (var column = columns.x; column < columns.y; column++) {
@@ -53,7 +53,7 @@ fn splat_scatter(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = places[id.x];
     let level = view.levels[place.level];
     let rows = tile_rows(place);
-    let cut = kernel_cut(view.truncation);
+    let cut = kernel_cut(truncation_of(view.truncation, densities[id.x].object));
     let room = arrayLength(&pairs);
     let each = round_pairs(room, arrayLength(&places));
     // Where all tiles' lists end: most often they fit in one round.

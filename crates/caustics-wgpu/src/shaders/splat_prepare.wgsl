@@ -3,6 +3,8 @@
 
 // The least standard deviation, in pixels of a level, that may be splatted there.
 const LEVEL_SIGMA: f32 = 2.0;
+// The same for Gaussians that overlap and light only their receiver's plane.
+const OVERLAP_LEVEL_SIGMA: f32 = 0.8;
 // Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
 // Footprints longer than this many pixels are not summed.
@@ -10,11 +12,17 @@ const SUMMED_EXTENT: f32 = 64.0;
 // The least standard deviation of a footprint, in pixels, that is read at the pixels' middles;
 // narrower ones are integrated over the pixels.
 const INTEGRATED_SIGMA: f32 = 0.9;
+// The same for footprints that overlap.
+const OVERLAP_INTEGRATED_SIGMA: f32 = 0.35;
+// Half a pixel's diagonal and a little, in pixels: no farther is the nearest pixel's middle.
+const LEAST_REACH: f32 = 0.75;
 // Half the widest rectangle of pixels that a footprint is integrated over.
 const INTEGRATED_EXTENT: f32 = 48.0;
 // The least cosine between the view and the normal of a footprint at which its blur serves for what
 // stands before its plane, too.
 const LEAST_FACING: f32 = 0.3;
+
+const_assert DENSITY_OVERLAP_BIT == OVERLAP_BIT;
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<storage, read> footprints: array<FootprintRecord>;
@@ -38,9 +46,9 @@ fn least_sigma(step_x: vec2<f32>, step_y: vec2<f32>) -> f32 {
 
 // By how much a small footprint must be brighter so that its values at the pixels' middles sum to
 // its flux.
-fn normalisation(place: SplatPlace) -> f32 {
+fn normalisation(place: SplatPlace, truncation: Truncation) -> f32 {
     let area = abs(place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x);
-    let cut = kernel_cut(view.truncation);
+    let cut = kernel_cut(truncation);
     let extent = vec2<f32>(length(place.step_y), length(place.step_x)) * (sqrt(cut) / area);
     if !(max(extent.x, extent.y) <= SUMMED_EXTENT) {
         return 1.0;
@@ -55,7 +63,7 @@ fn normalisation(place: SplatPlace) -> f32 {
         for (var x = first; x <= last; x += 1.0) {
             let offset = vec2<f32>(x + 0.5, y + 0.5) - place.center;
             let at = offset.x * place.step_x + offset.y * place.step_y;
-            sum += kernel_density(at.x, at.y, view.truncation);
+            sum += kernel_density(at.x, at.y, truncation);
         }
     }
     sum *= area;
@@ -69,10 +77,11 @@ fn pixel_range(low: f32, high: f32, stride: f32, size: u32) -> u32 {
     return first | (last << 16u);
 }
 
-// Chooses the level of resolution by the smallest standard deviation in pixels.
-fn choose_level(place: ptr<function, SplatPlace>, least: f32) {
-    var sigma = least;
-    while sigma >= 2.0 * LEVEL_SIGMA && (*place).level + 1u < LEVELS {
+// Chooses the level of resolution by the smallest standard deviation in pixels, and the least that it
+// may have in those of a level.
+fn choose_level(place: ptr<function, SplatPlace>, smallest: f32, least: f32) {
+    var sigma = smallest;
+    while sigma >= 2.0 * least && (*place).level + 1u < LEVELS {
         (*place).level += 1u;
         sigma *= 0.5;
         (*place).center *= 0.5;
@@ -109,14 +118,17 @@ fn covariance_of(record: FootprintRecord) -> Covariance {
     return covariance_of_axes(record.axis_u, record.axis_v, record.normal, view.scale, limit);
 }
 
-fn density_blurred(record: FootprintRecord, x: vec3<f32>, y: vec3<f32>) -> Density {
+// With a multiple of the variance of a pixel's edges on the receiver added, or taken away.
+fn density_blurred(record: FootprintRecord, x: vec3<f32>, y: vec3<f32>, variance: f32) -> Density {
     let tangent = tangent_of(record.normal);
     let bitangent = bitangent_of(record.normal);
-    let variance = kernel_pixel_variance();
     var c = covariance_of(record);
     c = covariance_add(c, variance, dot(x, tangent), dot(x, bitangent));
     c = covariance_add(c, variance, dot(y, tangent), dot(y, bitangent));
-    return density_spread(record.position, record.normal, record.incoming, flux_of(record), c);
+    let truncation = truncation_of(view.truncation, record.object);
+    return density_spread(
+        record.position, record.normal, record.incoming, flux_of(record), c, truncation,
+    );
 }
 
 // What other surfaces catch of a footprint whose plane is seen edge-on, or from behind. A plane that
@@ -138,16 +150,17 @@ fn prepare_before_plane(record: FootprintRecord, count: u32) -> f32 {
         record,
         axes.x - dot(axes.x, record.normal) * up,
         axes.y - dot(axes.y, record.normal) * up,
+        kernel_pixel_variance(),
     );
     if !(d.is_valid && is_finite_vector(record.position)) {
         return 0.0;
     }
-    let gate = gate_before(gate_of(density_reach(d, view.truncation)));
+    let gate = gate_before(gate_of(density_reach(d)));
     var bounds = bounds_of(d, vec2<f32>(gate.before, gate.reach));
     if is_outside(bounds) {
         return 0.0;
     }
-    let reached = in_reach(d, gate, record.object, bounds);
+    let reached = in_reach(d, gate, object_of(record.object), bounds);
     if reached.heights.x > reached.heights.y {
         return 0.0;
     }
@@ -159,7 +172,7 @@ fn prepare_before_plane(record: FootprintRecord, count: u32) -> f32 {
     place.shape = SHAPE_BOX;
     place.step_x = vec2<f32>(dot(axes.x, d.u_gradient), dot(axes.x, d.v_gradient));
     place.step_y = vec2<f32>(dot(axes.y, d.u_gradient), dot(axes.y, d.v_gradient));
-    choose_level(&place, least_sigma(place.step_x, place.step_y));
+    choose_level(&place, least_sigma(place.step_x, place.step_y), LEVEL_SIGMA);
     let index = count + atomicAdd(&counts.caught, 1u);
     return store(index, d, gate, record.object, 0.0, bounds, place);
 }
@@ -191,7 +204,10 @@ fn is_integrated(
     let extent = pixel_gaussian_extent(g);
     let cosine = max(-dot(record.incoming, record.normal), MIN_INCIDENCE);
     let strength = flux_of(record) / (abs(area) * cosine);
-    let is_small = covariance_eigenvalues(mapped).x < INTEGRATED_SIGMA * INTEGRATED_SIGMA
+    let reaching = LEAST_REACH / kernel_reach((*d).truncation);
+    let least = sqrt(max(reaching * reaching - kernel_pixel_variance(), 0.0));
+    let limit = select(INTEGRATED_SIGMA, max(OVERLAP_INTEGRATED_SIGMA, least), overlaps(record.object));
+    let is_small = covariance_eigenvalues(mapped).x < limit * limit
         && max(extent.x, extent.y) < INTEGRATED_EXTENT;
     if !(is_small && is_finite_vector(strength)) {
         return false;
@@ -203,6 +219,29 @@ fn is_integrated(
     // A pixel has at most all of the flux: as bright as the peak of this.
     (*d).strength = strength / kernel_peak(view.truncation);
     return true;
+}
+
+// Makes a footprint narrower by as much as interpolation from its level will blur it.
+// CPU twin: `Splat::undo_interpolation`.
+fn undo_interpolation(
+    record: FootprintRecord,
+    axes: PixelAxes,
+    place: ptr<function, SplatPlace>,
+    d: ptr<function, Density>,
+) {
+    if (*place).level == 0u {
+        return;
+    }
+    let stride = exp2(f32((*place).level));
+    let blur = 0.25 * (stride * stride - 1.0);
+    let narrower = density_blurred(record, axes.x, axes.y, kernel_pixel_variance() - blur);
+    if narrower.is_valid {
+        *d = narrower;
+        let u = narrower.u_gradient;
+        let v = narrower.v_gradient;
+        (*place).step_x = stride * vec2<f32>(dot(axes.x, u), dot(axes.x, v));
+        (*place).step_y = stride * vec2<f32>(dot(axes.y, u), dot(axes.y, v));
+    }
 }
 
 // Prepares one footprint and returns the peak of its irradiance, 0 if it is not splatted.
@@ -222,15 +261,15 @@ fn prepare(index: u32, count: u32) -> f32 {
     let axes = pixel_axes(record.position, record.normal);
     var d: Density;
     if axes.is_valid {
-        d = density_blurred(record, axes.x, axes.y);
+        d = density_blurred(record, axes.x, axes.y, kernel_pixel_variance());
     } else {
-        d = density_blurred(record, vec3<f32>(0.0), vec3<f32>(0.0));
+        d = density_blurred(record, vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
     }
     if !(d.is_valid && is_finite_vector(record.position)) {
         atomicAdd(&counts.invalid, 1u);
         return peak;
     }
-    var gate = gate_of(density_reach(d, view.truncation));
+    var gate = gate_of(density_reach(d));
     if facing < LEAST_FACING {
         gate = gate_own(gate);
     }
@@ -239,7 +278,7 @@ fn prepare(index: u32, count: u32) -> f32 {
         atomicAdd(&counts.outside, 1u);
         return peak;
     }
-    let reached = in_reach(d, gate, record.object, bounds);
+    let reached = in_reach(d, gate, object_of(record.object), bounds);
     if reached.heights.x > reached.heights.y {
         atomicAdd(&counts.hidden, 1u);
         return peak;
@@ -262,11 +301,18 @@ fn prepare(index: u32, count: u32) -> f32 {
             return peak + store(index, d, gate, record.object, 0.0, box, place);
         }
         if sigma < SMALL_SIGMA {
-            d.strength *= normalisation(place);
+            d.strength *= normalisation(place, d.truncation);
         }
     }
-    choose_level(&place, sigma);
-    let flat = 0.5 * exp2(f32(place.level)) / pixels_per_height(d);
+    let half_pixel = 0.5 / pixels_per_height(d);
+    let is_plain = reached.is_own && reached.heights.x >= -half_pixel && reached.heights.y <= half_pixel;
+    if is_linear && is_plain && overlaps(record.object) && FOOTPRINT_KERNEL == KERNEL_GAUSSIAN {
+        choose_level(&place, sigma, OVERLAP_LEVEL_SIGMA);
+        undo_interpolation(record, axes, &place, &d);
+    } else {
+        choose_level(&place, sigma, LEVEL_SIGMA);
+    }
+    let flat = exp2(f32(place.level)) * half_pixel;
     let is_flat = reached.heights.x >= -flat && reached.heights.y <= flat;
     if is_linear {
         place.shape = select(SHAPE_BY_TILE, SHAPE_ELLIPSE, is_flat && reached.is_own);

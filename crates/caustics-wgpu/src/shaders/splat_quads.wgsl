@@ -51,7 +51,7 @@ struct Slanted {
     v: vec2<f32>,
 }
 
-fn slanted(place: SplatPlace) -> Slanted {
+fn slanted(place: SplatPlace, truncation: Truncation) -> Slanted {
     if place.shape == SHAPE_INTEGRAL {
         let g = integral_of(place);
         let is_wide = g.strips < 0.0;
@@ -68,7 +68,7 @@ fn slanted(place: SplatPlace) -> Slanted {
     let determinant = place.step_x.x * place.step_y.y - place.step_x.y * place.step_y.x;
     if place.shape == SHAPE_ELLIPSE && determinant != 0.0 {
         // With a pixel to spare: a pixel's receiver need not lie under its middle.
-        let half = vec2<f32>(kernel_outer_reach(view.truncation)) + abs(place.step_x) + abs(place.step_y);
+        let half = vec2<f32>(kernel_outer_reach(truncation)) + abs(place.step_x) + abs(place.step_y);
         let u = vec2<f32>(place.step_y.y, -place.step_x.y) / determinant;
         let v = vec2<f32>(-place.step_y.x, place.step_x.x) / determinant;
         return Slanted(place.center, half.x * u, half.y * v);
@@ -92,7 +92,7 @@ fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
     let rows = vec2<f32>(range_of(place.rows));
     // The box around it, or the slanted square around its ellipse where that is less.
     var at = vec2<f32>(mix(columns.x, columns.y, side.x), mix(rows.x, rows.y, side.y));
-    let frame = slanted(place);
+    let frame = slanted(place, truncation_of(view.truncation, densities[index].object));
     let box = (columns.y - columns.x) * (rows.y - rows.x);
     if 4.0 * abs(frame.u.x * frame.v.y - frame.u.y * frame.v.x) < box {
         at = frame.middle + (2.0 * side.x - 1.0) * frame.u + (2.0 * side.y - 1.0) * frame.v;
@@ -124,7 +124,7 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
     let stored = densities[corner.index];
     let position = bitcast<vec3<f32>>(texel.xyz);
     let object = textureLoad(objects, vec2<i32>(corner.position.xy), 0).x;
-    let is_own = view.has_objects == 0u || object == stored.object;
+    let is_own = view.has_objects == 0u || object == object_of(stored.object);
     let cosine = density_cosine(
         stored,
         decode_octahedral(stored.normal),

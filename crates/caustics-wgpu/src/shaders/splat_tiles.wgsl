@@ -58,6 +58,7 @@ fn row_span(
     box: vec4<u32>,
     corner: vec2<u32>,
     row: u32,
+    cut: f32,
 ) -> vec2<u32> {
     let y = f32(corner.y + row);
     var ends = vec2<f32>(0.0);
@@ -65,7 +66,7 @@ fn row_span(
         ends = pixel_gaussian_span(integral_of(place), y, y + 1.0);
     } else if shape == SHAPE_ELLIPSE {
         // With a pixel to spare on each side: a pixel's receiver need not lie under its middle.
-        ends = ellipse_span(place, y + 0.5 - place.center.y, kernel_cut(view.truncation))
+        ends = ellipse_span(place, y + 0.5 - place.center.y, cut)
             + (place.center.x + vec2<f32>(-0.5, 0.5));
     } else {
         return box.xy;
@@ -90,7 +91,7 @@ fn weight_at(
     pixel: vec2<u32>,
 ) -> f32 {
     let position = bitcast<vec3<f32>>(at.xyz);
-    let is_own = view.has_objects == 0u || at.w == stored.object;
+    let is_own = view.has_objects == 0u || at.w == object_of(stored.object);
     let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
     if cosine == 0.0 {
         return 0.0;
@@ -189,9 +190,10 @@ fn splat_tiles(
                 let place = places[index];
                 let box = clipped(place, corner);
                 let shape = shape_in_tile(place, index, its);
+                let cut = kernel_cut(truncation_of(view.truncation, densities[index].object));
                 var area = 0u;
                 for (var y = box.z; y < box.w; y++) {
-                    let span = row_span(place, shape, box, corner, y);
+                    let span = row_span(place, shape, box, corner, y, cut);
                     area += span.y - span.x;
                 }
                 if area <= SMALL_AREA {
@@ -199,7 +201,7 @@ fn splat_tiles(
                     let plane = decode_octahedral(stored.normal);
                     let incoming = stored_incoming(stored);
                     for (var y = box.z; y < box.w; y++) {
-                        let span = row_span(place, shape, box, corner, y);
+                        let span = row_span(place, shape, box, corner, y, cut);
                         for (var x = span.x; x < span.y; x++) {
                             let at = TILE * y + x;
                             let weight = weight_at(

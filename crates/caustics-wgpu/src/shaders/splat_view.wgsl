@@ -25,8 +25,9 @@ struct SplatView {
     // Whether footprints as small as pixels are integrated over them.
     integrate_pixels: u32,
     surrounding_levels: u32,
-    // See `Truncation`.
-    truncation: vec2<f32>,
+    pad: vec2<u32>,
+    // See `Truncations`.
+    truncation: vec4<f32>,
     // Width, height, tiles across, first tile.
     levels: array<vec4<u32>, 8>,
     // Levels of what tiles of the picture show: width, height, first tile.

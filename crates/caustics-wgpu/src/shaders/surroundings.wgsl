@@ -80,12 +80,12 @@ fn relation(tile: SurroundingTile, is_border: bool, stored: StoredDensity) -> u3
         let u = surrounding_extent(tile, stored.u_gradient, stored.center);
         let v = surrounding_extent(tile, stored.v_gradient, stored.center);
         let off = max(vec2<f32>(abs(u.x) - u.y, abs(v.x) - v.y), vec2<f32>(0.0));
-        let reach = kernel_outer_reach(view.truncation);
+        let reach = kernel_outer_reach(truncation_of(view.truncation, stored.object));
         if dot(off, off) > reach * reach {
             return RELATION_DARK;
         }
     }
     let is_flat = heights.x >= -stored.flat && heights.y <= stored.flat;
-    let is_plain = is_flat && surrounding_is_own(tile, stored.object);
+    let is_plain = is_flat && surrounding_is_own(tile, object_of(stored.object));
     return select(RELATION_MIXED, RELATION_FLAT, is_plain);
 }

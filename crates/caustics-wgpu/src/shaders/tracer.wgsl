@@ -53,18 +53,18 @@ fn receive(branch: Branch, point: SurfacePoint) -> u32 {
     if branch.events == 0u {
         return FATE_DIRECT;
     }
-    let axes = footprint_axes(branch.differential, point.geometric_normal);
+    let its = footprint(branch.differential, point.geometric_normal);
     let side = select(-1.0, 1.0, point.from_outside);
     let object = bodies[point.body].object;
     let record = FootprintRecord(
         point.spawn.position,
         branch.flux.x,
-        axes[0],
+        its.axes[0],
         branch.flux.y,
-        axes[1],
+        its.axes[1],
         branch.flux.z,
         branch.ray.direction,
-        object,
+        object | select(0u, OVERLAP_BIT, its.is_overlap),
         side * point.geometric_normal,
         photon_number,
     );

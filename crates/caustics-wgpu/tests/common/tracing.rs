@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use caustics_scene::gltf::load_path;
 use caustics_scene::{BvhOptions, SceneIntersector, World};
 use caustics_trace::{
-    EmissionPlan, EnergyLedger, Fate, FootprintSource, LedgerEntry, Photon, PhotonTrail,
+    Coverage, EmissionPlan, EnergyLedger, Fate, FootprintSource, LedgerEntry, Photon, PhotonTrail,
     TraceOptions, trace_photon, trace_plan,
 };
 use caustics_wgpu::glam::Vec3;
@@ -177,6 +177,10 @@ pub(crate) struct Difference {
     pub(crate) axes: f32,
     /// The largest difference of a unit vector.
     pub(crate) directions: f32,
+    /// Records whose footprint overlaps others on one side alone.
+    pub(crate) other_coverages: usize,
+    /// Records of footprints that overlap others.
+    pub(crate) overlaps: usize,
     /// Records whose every bit is the same, of so many on the same paths.
     pub(crate) equal_records: (usize, usize),
 }
@@ -190,6 +194,8 @@ impl fmt::Debug for Difference {
             .field("flux", &self.flux)
             .field("axes", &self.axes)
             .field("directions", &self.directions)
+            .field("other_coverages", &self.other_coverages)
+            .field("overlaps", &self.overlaps)
             .field("equal_records", &self.equal_records)
             .finish()
     }
@@ -212,7 +218,9 @@ impl Difference {
         let mut difference = Self::default();
         for (number, (trail, stored)) in trails.iter().zip(&traced.photons).enumerate() {
             // A hash is of what the path met before it landed.
-            let paths = stored.iter().map(|(path, record)| (*path, record.object));
+            let paths = stored
+                .iter()
+                .map(|(path, record)| (*path, record.receiver()));
             let objects = trail.photons.iter().map(|photon| photon.object);
             if paths.eq(trail.paths.iter().copied().zip(objects)) {
                 for ((_, record), photon) in stored.iter().zip(&trail.photons) {
@@ -249,6 +257,8 @@ impl Difference {
             self.axes = larger(self.axes, axes / longer);
         }
         self.directions = larger(self.directions, directions);
+        self.other_coverages += usize::from(record.coverage() != photon.coverage);
+        self.overlaps += usize::from(record.coverage() == Coverage::Overlap);
         self.equal_records.0 += usize::from(*record == expected);
         self.equal_records.1 += 1;
     }
