@@ -6,8 +6,8 @@ use caustics_geometry::TriangleMesh;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{Quat, Vec3};
 use caustics_trace::{
-    Branching, Fate, FootprintSource, Photon, PhotonMap, TraceOptions, fresnel_dielectric,
-    fresnel_schlick, trace_photons,
+    Branching, Fate, FootprintSource, Photon, PhotonMap, TraceOptions, fresnel_schlick,
+    trace_photons,
 };
 
 use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
