@@ -169,6 +169,37 @@ fn fluxes_at_the_ends_of_the_numbers_stay_right() -> Result<(), TestError> {
 }
 
 #[test]
+fn footprints_that_end_beside_the_picture_add_nothing_to_it() -> Result<(), TestError> {
+    let picture = floor()?;
+    // Light that slants over the picture could reach it above its plane, but not on it.
+    let beside = |pixels: f32| {
+        let out = -pixels / SIZE as f32;
+        let toward_x = Photon {
+            incoming: Vec3::new(-0.8, -0.6, 0.0),
+            ..photon(out, 0.4987, 1e-3, 1.0)
+        };
+        let toward_z = Photon {
+            incoming: Vec3::new(0.0, -0.6, -0.8),
+            ..photon(0.5031, out, 1e-3, 1.0)
+        };
+        [toward_x, toward_z]
+    };
+    let mut photons = vec![photon(0.5031, 0.4987, 1e-3, 1.0)];
+    photons.extend([1.2, 1.4, 1.7, 2.5].map(beside).as_flattened().repeat(10));
+    for (features, method, tolerance) in ways() {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        let options = options(method, SplatKernel::Gaussian);
+        let (found, stats) = irradiance(&device, &queue, &options, &picture, &[&photons])?;
+        let found = flux(&found);
+        assert!((found - 1.0).abs() < tolerance, "{method:?}: {found}");
+        assert_eq!((stats.splatted, stats.outside), (1, 80), "{method:?}");
+    }
+    Ok(())
+}
+
+#[test]
 fn footprints_that_are_not_finite_or_not_seen_are_counted() -> Result<(), TestError> {
     let picture = floor()?;
     let Some((device, queue)) = device_with(wgpu::Features::empty()) else {
