@@ -118,7 +118,7 @@
 //! blended. Coarse levels are added to finer ones, interpolated over pixels that see the same surface.
 //!
 //! Every gate is that of the CPU's `splat`, and so are the sums: over the pixels without an edge, on
-//! the ten scenes of the tests, within 0.03 % by tiles and by 32-bit quads, within 0.6 % by half
+//! the ten scenes of the tests, within 0.03 % by tiles and by 32-bit quads, within 0.2 % by half
 //! floats. Tiles give the same bits in every run; quads and gathers differ in the last bits, since
 //! they add in any order. A gather keeps every footprint, however many lie on a point, as the CPU's
 //! does where `FootprintOptions::max_overlaps` is infinite, its default.
