@@ -300,19 +300,24 @@ mod tests {
     fn views_take_the_memory_that_the_documentation_says() {
         let half_floats = SumFormat {
             format: wgpu::TextureFormat::Rgba16Float,
-            layers: 8,
+            layers: 4,
             is_blended: true,
+        };
+        let blended = SumFormat {
+            is_blended: true,
+            ..SumFormat::WRITTEN
         };
         let found = [
             bytes_a_pixel(SumFormat::WRITTEN, 1),
             bytes_a_pixel(SumFormat::WRITTEN, 2),
+            bytes_a_pixel(blended, 1),
             bytes_a_pixel(half_floats, 1),
         ];
         let words = found.map(|it| format!("{it:.0}"));
         let told = format!(
-            "A view takes {} bytes a pixel, {} where tiles sum several batches, and {} in half floats \
-             and eight layers",
-            words[0], words[1], words[2]
+            "A view takes {} bytes a pixel, {} where tiles sum several batches, {} where quads are \
+             blended in 32 bits, and {} in half floats and four layers",
+            words[0], words[1], words[2], words[3]
         );
         let documentation = include_str!("lib.rs").replace("\n//!", "");
         assert!(documentation.contains(&told), "{told}");
