@@ -56,11 +56,11 @@ impl<'a> Recorder<'a> {
             })
     }
 
-    /// Begins a render pass of one color target that holds so many draws.
+    /// Begins a render pass of these color targets that holds so many draws.
     pub(crate) fn render(
         &mut self,
         label: &'static str,
-        target: &wgpu::TextureView,
+        targets: &[wgpu::TextureView],
         load: wgpu::LoadOp<wgpu::Color>,
         draws: u32,
     ) -> wgpu::RenderPass<'_> {
@@ -73,17 +73,21 @@ impl<'a> Recorder<'a> {
                     beginning_of_pass_write_index: Some(first),
                     end_of_pass_write_index: Some(first + 1),
                 });
-        self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(label),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
+        let attachment = |view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
                 depth_slice: None,
                 resolve_target: None,
                 ops: wgpu::Operations {
                     load,
                     store: wgpu::StoreOp::Store,
                 },
-            })],
+            })
+        };
+        let color_attachments: Vec<_> = targets.iter().map(attachment).collect();
+        self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(label),
+            color_attachments: &color_attachments,
             timestamp_writes,
             ..wgpu::RenderPassDescriptor::default()
         })

@@ -64,9 +64,10 @@ impl Splat {
         let format = sum_format(device, options);
         let stages = wgpu::ShaderStages::COMPUTE;
         let kernel = [options.kernel.constant()];
-        let make = |shader: &Shader, slots: &[Slot]| {
+        let limbs = [format.limbs_constant()];
+        let make = |shader: &Shader, slots: &[Slot], constants: &[(&str, f64)]| {
             let layout = PassLayout::new(device, shader.label, stages, slots);
-            let pipeline = layout.compute(device, shader, shader.label, &kernel);
+            let pipeline = layout.compute(device, shader, shader.label, constants);
             (layout, pipeline)
         };
         let prepare = [
@@ -95,8 +96,8 @@ impl Splat {
             options: *options,
             format,
             receivers: ReceiverPasses::new(device, &kernel),
-            prepare: make(&PREPARE, &prepare),
-            upsample: make(&UPSAMPLE, &upsample),
+            prepare: make(&PREPARE, &prepare, &kernel),
+            upsample: make(&UPSAMPLE, &upsample, &[kernel[0], limbs[0]]),
             way: match options.method {
                 SplatMethod::Tiles => Way::Tiles(SplatTiles::new(device, options)?),
                 SplatMethod::Quads => Way::Quads(SplatQuads::new(device, options, format)?),
@@ -131,41 +132,17 @@ impl Splat {
         if matches!(self.way, Way::Tiles(_)) && batches.len() > 1 {
             targets.second_sum(device);
         }
-        if let Way::Quads(quads) = &self.way
-            && quads.is_scaled()
-        {
-            // The scale is that of all batches together, and so is the estimate.
-            let steps = &self.steps;
-            for (number, batch) in batches.iter().enumerate() {
-                self.record_prepare(device, recorder, view, targets, scratch, batch);
-                quads.record_scale(device, recorder, targets, scratch, steps, number == 0);
-            }
-            for (number, batch) in batches.iter().enumerate() {
-                let is_first = number == 0;
-                if batches.len() > 1 {
-                    self.record_prepare(device, recorder, view, targets, scratch, batch);
-                }
-                quads.record_order(device, recorder, targets, scratch, steps, batch, is_first);
-                quads.record_estimate(device, recorder, view, targets, scratch, is_first);
-            }
-            recorder.encoder.clear_buffer(&targets.counts, 0, None);
+        if let Way::Quads(quads) = &self.way {
+            self.record_quads(device, recorder, view, targets, scratch, batches, quads);
         }
         let mut sums = 0;
-        for (number, batch) in batches.iter().enumerate() {
-            let is_first = number == 0;
-            self.record_prepare(device, recorder, view, targets, scratch, batch);
-            match &self.way {
-                Way::Tiles(tiles) => {
-                    sums = number % 2;
-                    let into = (sums, is_first);
-                    let steps = &self.steps;
-                    tiles.record(device, recorder, view, targets, scratch, steps, batch, into)?;
-                }
-                Way::Quads(quads) => {
-                    let steps = &self.steps;
-                    quads.record_order(device, recorder, targets, scratch, steps, batch, is_first);
-                    quads.record(device, recorder, view, targets, scratch, is_first);
-                }
+        if let Way::Tiles(tiles) = &self.way {
+            for (number, batch) in batches.iter().enumerate() {
+                self.record_prepare(device, recorder, view, targets, scratch, batch);
+                sums = number % 2;
+                let into = (sums, number == 0);
+                let steps = &self.steps;
+                tiles.record(device, recorder, view, targets, scratch, steps, batch, into)?;
             }
         }
         if batches.is_empty() {
@@ -176,6 +153,55 @@ impl Splat {
             self.record_upsample(device, recorder, view, targets, sums);
         }
         Ok(())
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one frame's worth")]
+    fn record_quads(
+        &self,
+        device: &wgpu::Device,
+        recorder: &mut Recorder<'_>,
+        view: &wgpu::Buffer,
+        targets: &SplatTargets,
+        scratch: &SplatScratch,
+        batches: &[FootprintBatch<'_>],
+        quads: &SplatQuads,
+    ) {
+        let steps = &self.steps;
+        // Scale and units are those of all batches together: there is room for one at a time, so that
+        // each of several is prepared anew for each.
+        let is_one = batches.len() == 1;
+        let prepare = |recorder: &mut Recorder<'_>, batch| {
+            self.record_prepare(device, recorder, view, targets, scratch, batch);
+        };
+        let order = |recorder: &mut Recorder<'_>, batch, is_first| {
+            quads.record_order(device, recorder, targets, scratch, steps, batch, is_first);
+        };
+        if self.format.is_half() {
+            for (number, batch) in batches.iter().enumerate() {
+                prepare(recorder, batch);
+                quads.record_scale(device, recorder, targets, scratch, steps, number == 0);
+            }
+        }
+        for (number, batch) in batches.iter().enumerate() {
+            let is_first = number == 0;
+            if !(is_one && self.format.is_half()) {
+                prepare(recorder, batch);
+            }
+            order(recorder, batch, is_first);
+            quads.record_sample(device, recorder, view, targets, scratch, is_first);
+        }
+        quads.record_units(device, recorder, view, targets, steps);
+        if !is_one {
+            recorder.encoder.clear_buffer(&targets.counts, 0, None);
+        }
+        for (number, batch) in batches.iter().enumerate() {
+            let is_first = number == 0;
+            if !is_one {
+                prepare(recorder, batch);
+                order(recorder, batch, is_first);
+            }
+            quads.record(device, recorder, view, targets, scratch, is_first);
+        }
     }
 
     fn record_prepare(

@@ -68,9 +68,10 @@ pub struct SplatOptions {
     /// pairs without room even then are counted in
     /// [`SplatStats::dropped_pairs`](crate::SplatStats::dropped_pairs).
     pub pairs_per_footprint: u32,
-    /// Layers among which quads are shared where they are blended in half floats, 1 to 16. Each
-    /// addition rounds to 11 bits of what is already there, so less is lost where less is there:
-    /// the layers are summed in 32 bits.
+    /// Layers among which quads are shared where they are blended in half floats, 1 to 16, each of
+    /// two textures: what the first rounds off is in the second. The layers are summed in 32 bits.
+    /// Errors are in inverse proportion to their number, or to its root where many hundreds of
+    /// footprints are on a pixel.
     pub half_float_layers: u32,
     /// Blends quads in half floats even where 32 bits could be blended.
     pub prefer_half_floats: bool,
@@ -87,7 +88,7 @@ impl Default for SplatOptions {
             max_anisotropy: f32::INFINITY,
             integrate_pixels: true,
             pairs_per_footprint: 8,
-            half_float_layers: 8,
+            half_float_layers: 4,
             prefer_half_floats: false,
         }
     }

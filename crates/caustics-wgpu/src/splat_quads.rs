@@ -20,6 +20,7 @@ const ORDER: Shader = Shader {
         shader_piece!("pixel_integral"),
         shader_piece!("splat_place"),
         shader_piece!("splat_scale"),
+        shader_piece!("splat_sample"),
         shader_piece!("splat_order"),
     ],
 };
@@ -33,7 +34,19 @@ const QUADS: Shader = Shader {
         shader_piece!("pixel_integral"),
         shader_piece!("splat_place"),
         shader_piece!("splat_scale"),
+        shader_piece!("splat_sample"),
+        shader_piece!("splat_rounding"),
         shader_piece!("splat_quads"),
+    ],
+};
+
+const UNITS: Shader = Shader {
+    label: "splat_units",
+    pieces: &[
+        shader_piece!("splat_view"),
+        shader_piece!("splat_scale"),
+        shader_piece!("splat_sample"),
+        shader_piece!("splat_units"),
     ],
 };
 
@@ -52,17 +65,18 @@ struct SplatDraw {
 
 /// Draws footprints as quads, which the blending unit adds.
 ///
-/// Half floats have 11 bits: each addition errs by up to half of the last one of what is already
-/// there, or by all of it where the hardware cuts off, so that thousands of footprints on a pixel
-/// stop to add up; and numbers beyond 65,504 or below 6e-8 do not exist. Against it:
+/// Floats of b bits err by up to half of the last bit of what is already there at each addition, or by
+/// all of it where the hardware cuts off: of n equal parts that is up to n 2^-b of their sum, all in
+/// one direction. Half floats of 11 bits stop to add up after a thousand; numbers beyond 65,504 or
+/// below 6e-8 do not exist in them. Against it:
 ///
-/// - irradiance is scaled while it is blended, by the sum of the peaks of all footprints, which no
-///   pixel can exceed;
-/// - quads are shared among layers, each with less in it;
-/// - a sixteenth of the footprints, or 2,048 of a level, is drawn first, for an estimate of each
-///   pixel's sum. Then each
-///   footprint adds a multiple of a 2^9th of that, rounded up or down so that the mean is right
-///   (dithering along the golden ratio): such sums are exact.
+/// - a sixteenth of the footprints is drawn first, for an estimate of each pixel's sum. Then each
+///   footprint adds a multiple of a small part of that, rounded up or down so that the mean is right
+///   (dithering along the golden ratio): such sums are exact;
+/// - where half floats are blended, what was rounded is blended into a second target, which makes
+///   them as good as floats of 20 bits;
+/// - there, quads are shared among layers, each with less in it; and irradiance is scaled by the sum of
+///   the peaks of all footprints, which no pixel can exceed.
 #[derive(Clone, Debug)]
 pub(crate) struct SplatQuads {
     order: PassLayout,
@@ -71,9 +85,8 @@ pub(crate) struct SplatQuads {
     peaks: wgpu::ComputePipeline,
     quads: PassLayout,
     draw: wgpu::RenderPipeline,
-    /// For the estimate.
     draw_sample: wgpu::RenderPipeline,
-    nothing: wgpu::TextureView,
+    units: (PassLayout, wgpu::ComputePipeline),
     uniforms: wgpu::Buffer,
     format: SumFormat,
 }
@@ -104,7 +117,7 @@ impl SplatQuads {
             Slot::Read,
             Slot::UintTexture,
             Slot::Read,
-            Slot::Texture,
+            Slot::UintTexture,
             Slot::UintTexture,
         ];
         let quads = PassLayout::new(
@@ -133,38 +146,35 @@ impl SplatQuads {
             };
             place[..size_of::<SplatDraw>()].copy_from_slice(bytemuck::bytes_of(&draw));
         }
-        let pipeline = |rounding: f64| {
-            let constants = [kernel[0], ("QUADS_ROUNDING", rounding)];
-            draw_pipeline(device, &quads, format, &constants)
+        let units = [
+            Slot::Uniform,
+            Slot::Uniform,
+            Slot::Layers,
+            Slot::Store(wgpu::TextureFormat::Rgba8Uint),
+        ];
+        let units = PassLayout::new(device, "splat_units", wgpu::ShaderStages::COMPUTE, &units);
+        let limbs = [format.limbs_constant()];
+        let pipeline = |is_sampled| {
+            let sampled = if is_sampled { 1.0 } else { 0.0 };
+            let constants = [kernel[0], limbs[0], ("QUADS_SAMPLED", sampled)];
+            draw_pipeline(device, &quads, format, is_sampled, &constants)
         };
-        let nothing = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("caustics nothing"),
-            size: wgpu::Extent3d::default(),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
         let usage = wgpu::BufferUsages::UNIFORM;
         Ok(Self {
             sort: order.compute(device, &ORDER, "splat_order", &kernel),
             draws: order.compute(device, &ORDER, "splat_draws", &kernel),
             peaks: order.compute(device, &ORDER, "splat_peaks", &kernel),
-            draw: pipeline(if is_scaled(format) { 1.0 } else { 0.0 }),
-            draw_sample: pipeline(2.0),
-            nothing: nothing.create_view(&wgpu::TextureViewDescriptor::default()),
+            draw: pipeline(false),
+            draw_sample: pipeline(true),
+            units: {
+                let pipeline = units.compute(device, &UNITS, "splat_units", &limbs);
+                (units, pipeline)
+            },
             uniforms: filled_buffer(device, "splat draws", usage, &bytes)?,
             order,
             quads,
             format,
         })
-    }
-
-    /// Whether irradiance is scaled while it is blended.
-    pub(crate) fn is_scaled(&self) -> bool {
-        is_scaled(self.format)
     }
 
     fn bind_order(
@@ -199,13 +209,11 @@ impl SplatQuads {
         steps: &SplatSteps,
         is_first: bool,
     ) {
-        if self.is_scaled() {
-            let group = self.bind_order(device, targets, scratch, steps, is_first);
-            let mut pass = recorder.compute("splat_scale", 1);
-            pass.set_pipeline(&self.peaks);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
-        }
+        let group = self.bind_order(device, targets, scratch, steps, is_first);
+        let mut pass = recorder.compute("splat_scale", 1);
+        pass.set_pipeline(&self.peaks);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
     }
 
     /// Orders a batch of prepared footprints by their levels.
@@ -230,8 +238,8 @@ impl SplatQuads {
         pass.dispatch_workgroups(1, 1, 1);
     }
 
-    /// Draws the sample of an ordered batch into the estimate, where there is one.
-    pub(crate) fn record_estimate(
+    /// Draws the sample of an ordered batch to where the sums will be, for the units.
+    pub(crate) fn record_sample(
         &self,
         device: &wgpu::Device,
         recorder: &mut Recorder<'_>,
@@ -240,23 +248,48 @@ impl SplatQuads {
         scratch: &SplatScratch,
         is_first: bool,
     ) {
-        let Some(estimate) = &targets.estimate else {
-            return;
-        };
         let samples = LEVELS as u64 * u64::from(self.format.layers);
         for level in 0..LEVELS {
-            let index = samples + level as u64;
-            let group = self.bind_quads(device, view, targets, scratch, (level, index), None);
-            let target = &estimate.single[level][0];
-            let mut pass = recorder.render("splat_estimate", target, load(is_first), 1);
+            let place = (level, samples + level as u64);
+            let group = self.bind_quads(device, view, targets, scratch, place);
+            let into = self.limbs_of(targets, level, 0);
+            let mut pass = recorder.render("splat_sample", into, load(is_first), 1);
             self.draw_into(
                 &mut pass,
                 &self.draw_sample,
                 targets,
                 scratch,
-                (level, index),
+                place,
                 &group,
             );
+        }
+    }
+
+    /// Chooses by the samples of all batches how finely each pixel is rounded.
+    pub(crate) fn record_units(
+        &self,
+        device: &wgpu::Device,
+        recorder: &mut Recorder<'_>,
+        view: &wgpu::Buffer,
+        targets: &SplatTargets,
+        steps: &SplatSteps,
+    ) {
+        let (layout, pipeline) = &self.units;
+        let mut pass = recorder.compute("splat_units", LEVELS as u32);
+        pass.set_pipeline(pipeline);
+        for (level, into) in targets.units.iter().flatten().enumerate() {
+            let group = layout.bind(
+                device,
+                &[
+                    view.as_entire_binding(),
+                    steps.at(level, true),
+                    wgpu::BindingResource::TextureView(&targets.sums[0].layers[level]),
+                    wgpu::BindingResource::TextureView(into),
+                ],
+            );
+            let [width, height, ..] = targets.levels[level];
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
         }
     }
 
@@ -271,16 +304,26 @@ impl SplatQuads {
         is_first: bool,
     ) {
         for level in 0..LEVELS {
-            let estimate = targets.estimate.as_ref().map(|it| &it.single[level][0]);
             for layer in 0..self.format.layers {
                 let index = level as u64 * u64::from(self.format.layers) + u64::from(layer);
                 let place = (level, index);
-                let group = self.bind_quads(device, view, targets, scratch, place, estimate);
-                let target = &targets.sums[0].single[level][layer as usize];
-                let mut pass = recorder.render("splat_quads", target, load(is_first), 1);
+                let group = self.bind_quads(device, view, targets, scratch, place);
+                let into = self.limbs_of(targets, level, layer);
+                let mut pass = recorder.render("splat_quads", into, load(is_first), 1);
                 self.draw_into(&mut pass, &self.draw, targets, scratch, place, &group);
             }
         }
+    }
+
+    /// What a layer of a level is blended into.
+    fn limbs_of<'a>(
+        &self,
+        targets: &'a SplatTargets,
+        level: usize,
+        layer: u32,
+    ) -> &'a [wgpu::TextureView] {
+        let limbs = self.format.limbs() as usize;
+        &targets.sums[0].single[level][limbs * layer as usize..][..limbs]
     }
 
     /// For a level, and for the number of a draw.
@@ -291,9 +334,10 @@ impl SplatQuads {
         targets: &SplatTargets,
         scratch: &SplatScratch,
         (level, index): (usize, u64),
-        estimate: Option<&wgpu::TextureView>,
     ) -> wgpu::BindGroup {
         let size = size_of::<SplatDraw>() as u64;
+        // Sums that are blended have units; what stands for them is never read.
+        let units = targets.units.as_ref().unwrap_or(&targets.objects);
         self.quads.bind(
             device,
             &[
@@ -305,7 +349,7 @@ impl SplatQuads {
                 targets.counts.as_entire_binding(),
                 wgpu::BindingResource::TextureView(&targets.texels[level]),
                 targets.scale.as_entire_binding(),
-                wgpu::BindingResource::TextureView(estimate.unwrap_or(&self.nothing)),
+                wgpu::BindingResource::TextureView(&units[level]),
                 wgpu::BindingResource::TextureView(&targets.objects[level]),
             ],
         )
@@ -329,10 +373,6 @@ impl SplatQuads {
     }
 }
 
-fn is_scaled(format: SumFormat) -> bool {
-    format.format == wgpu::TextureFormat::Rgba16Float
-}
-
 fn load(is_first: bool) -> wgpu::LoadOp<wgpu::Color> {
     if is_first {
         wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT)
@@ -341,18 +381,40 @@ fn load(is_first: bool) -> wgpu::LoadOp<wgpu::Color> {
     }
 }
 
+const ADD: wgpu::BlendComponent = wgpu::BlendComponent {
+    src_factor: wgpu::BlendFactor::One,
+    dst_factor: wgpu::BlendFactor::One,
+    operation: wgpu::BlendOperation::Add,
+};
+
 fn draw_pipeline(
     device: &wgpu::Device,
     layout: &PassLayout,
     format: SumFormat,
+    is_sampled: bool,
     constants: &[(&str, f64)],
 ) -> wgpu::RenderPipeline {
-    let module = QUADS.module(device);
-    let add = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::One,
-        dst_factor: wgpu::BlendFactor::One,
-        operation: wgpu::BlendOperation::Add,
+    let entry_point = match (format.limbs(), is_sampled) {
+        (1, false) => "splat_single",
+        (1, true) => "splat_single_sample",
+        (_, false) => "splat_double",
+        (_, true) => "splat_double_sample",
     };
+    let target = wgpu::ColorTargetState {
+        format: format.format,
+        blend: Some(wgpu::BlendState {
+            color: ADD,
+            alpha: ADD,
+        }),
+        // A sample counts in alpha how many add to a pixel.
+        write_mask: if is_sampled {
+            wgpu::ColorWrites::ALL
+        } else {
+            wgpu::ColorWrites::COLOR
+        },
+    };
+    let targets = vec![Some(target); format.limbs() as usize];
+    let module = QUADS.module(device);
     let compilation_options = wgpu::PipelineCompilationOptions {
         constants,
         ..wgpu::PipelineCompilationOptions::default()
@@ -374,16 +436,9 @@ fn draw_pipeline(
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some("splat_fragment"),
+            entry_point: Some(entry_point),
             compilation_options,
-            targets: &[Some(wgpu::ColorTargetState {
-                format: format.format,
-                blend: Some(wgpu::BlendState {
-                    color: add,
-                    alpha: add,
-                }),
-                write_mask: wgpu::ColorWrites::COLOR,
-            })],
+            targets: &targets,
         }),
         multiview_mask: None,
         cache: None,
@@ -398,7 +453,7 @@ mod tests {
 
     #[test]
     fn the_shaders_are_valid_and_agree_with_rust() {
-        for shader in [&ORDER, &QUADS] {
+        for shader in [&ORDER, &QUADS, &UNITS] {
             let valid = reflection::validated(shader);
             assert!(valid.is_ok(), "{}", valid.unwrap_err());
         }

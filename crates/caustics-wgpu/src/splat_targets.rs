@@ -17,8 +17,8 @@ pub(crate) struct SplatTargets {
     /// What is summed at each level alone, before and after a batch: one of two, or one that is
     /// blended into.
     pub(crate) sums: Vec<SumTarget>,
-    /// An estimate of the sums, where they are blended in half floats.
-    pub(crate) estimate: Option<SumTarget>,
+    /// For each level, exponents that say how finely each pixel is rounded, where sums are blended.
+    pub(crate) units: Option<Vec<wgpu::TextureView>>,
     /// For each level: its own and all coarser ones.
     pub(crate) totals: Vec<wgpu::TextureView>,
     pub(crate) irradiance: wgpu::Texture,
@@ -28,7 +28,7 @@ pub(crate) struct SplatTargets {
     pub(crate) scale: wgpu::Buffer,
 }
 
-/// Sums of each level.
+/// Sums of each level: of each layer, all its limbs one after the other.
 #[derive(Clone, Debug)]
 pub(crate) struct SumTarget {
     /// For each level, all layers.
@@ -53,6 +53,21 @@ impl SumFormat {
         layers: 1,
         is_blended: false,
     };
+
+    /// Numbers that a sum is kept in, each in a texture's layer of its own.
+    pub(crate) fn limbs(self) -> u32 {
+        if self.is_half() { 2 } else { 1 }
+    }
+
+    /// The same as shaders know it.
+    pub(crate) fn limbs_constant(self) -> (&'static str, f64) {
+        ("SUM_LIMBS", f64::from(self.limbs()))
+    }
+
+    /// Whether these are half floats, and irradiance is scaled while it is blended.
+    pub(crate) fn is_half(self) -> bool {
+        self.format == wgpu::TextureFormat::Rgba16Float
+    }
 }
 
 /// A texture that a view needs.
@@ -95,7 +110,7 @@ struct ViewTextures {
     texels: ViewTexture,
     objects: ViewTexture,
     sum: ViewTexture,
-    estimate: Option<ViewTexture>,
+    units: Option<ViewTexture>,
     coarse: ViewTexture,
     irradiance: ViewTexture,
 }
@@ -113,7 +128,7 @@ impl ViewTextures {
         };
         let sum = ViewTexture {
             label: "caustics sums",
-            layers: format.layers,
+            layers: format.layers * format.limbs(),
             format: format.format,
             usage: if format.is_blended {
                 wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING
@@ -122,7 +137,6 @@ impl ViewTextures {
             },
             ..texels
         };
-        let is_estimated = format.format == wgpu::TextureFormat::Rgba16Float;
         Self {
             texels,
             objects: ViewTexture {
@@ -131,10 +145,10 @@ impl ViewTextures {
                 ..texels
             },
             sum,
-            estimate: is_estimated.then_some(ViewTexture {
-                label: "caustics estimate",
-                layers: 1,
-                ..sum
+            units: format.is_blended.then_some(ViewTexture {
+                label: "caustics units",
+                format: wgpu::TextureFormat::Rgba8Uint,
+                ..texels
             }),
             coarse: ViewTexture {
                 label: "caustics totals",
@@ -184,7 +198,7 @@ impl SplatTargets {
             texels: single(&texels),
             objects: single(&objects),
             sums: vec![SumTarget::of(&sum)],
-            estimate: parts.estimate.map(|it| SumTarget::of(&it.make(device))),
+            units: parts.units.map(|it| single(&it.make(device))),
             totals,
             irradiance,
             surroundings: bound_buffer(
@@ -276,7 +290,7 @@ mod tests {
         let size = UVec2::new(1920, 1080);
         let parts = ViewTextures::of(size, format);
         let others = [parts.texels, parts.objects, parts.coarse, parts.irradiance];
-        let textures = others.iter().chain(&parts.estimate).map(bytes).sum::<u64>();
+        let textures = others.iter().chain(&parts.units).map(bytes).sum::<u64>();
         let tiles = u64::from(SurroundingLevels::of(size).tiles) * SURROUNDING_BYTES;
         let all = textures + sums * bytes(&parts.sum) + tiles;
         all as f64 / f64::from(size.x * size.y)
@@ -286,19 +300,24 @@ mod tests {
     fn views_take_the_memory_that_the_documentation_says() {
         let half_floats = SumFormat {
             format: wgpu::TextureFormat::Rgba16Float,
-            layers: 8,
+            layers: 4,
             is_blended: true,
+        };
+        let blended = SumFormat {
+            is_blended: true,
+            ..SumFormat::WRITTEN
         };
         let found = [
             bytes_a_pixel(SumFormat::WRITTEN, 1),
             bytes_a_pixel(SumFormat::WRITTEN, 2),
+            bytes_a_pixel(blended, 1),
             bytes_a_pixel(half_floats, 1),
         ];
         let words = found.map(|it| format!("{it:.0}"));
         let told = format!(
-            "A view takes {} bytes a pixel, {} where tiles sum several batches, and {} in half floats \
-             and eight layers",
-            words[0], words[1], words[2]
+            "A view takes {} bytes a pixel, {} where tiles sum several batches, {} where quads are \
+             blended in 32 bits, and {} in half floats and four layers",
+            words[0], words[1], words[2], words[3]
         );
         let documentation = include_str!("lib.rs").replace("\n//!", "");
         assert!(documentation.contains(&told), "{told}");

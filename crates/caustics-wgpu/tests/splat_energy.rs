@@ -159,6 +159,60 @@ fn a_hundred_thousand_footprints_on_a_pixel_neither_overflow_nor_stop_to_add_up(
     Ok(())
 }
 
+/// Numbers from 0 up to 1 that spread evenly (the golden ratio's multiples).
+fn spread(index: u32) -> f32 {
+    (index.wrapping_mul(0x9e37_79b9) >> 8) as f32 / 16_777_216.0
+}
+
+#[test]
+fn a_focus_of_hundreds_of_thousands_of_footprints_is_right_in_every_pixel() -> Result<(), TestError>
+{
+    let picture = floor()?;
+    // Equal ones on a pixel, of the middle pixel of an odd number so that no binary fraction is exact.
+    let equal = vec![photon(0.5031, 0.4987, 1e-3, 0.7); 300_000];
+    // Others around it, each with another flux and place, in rows that land together.
+    let around = (0..100_000).map(|index| {
+        let row = (index / 1000) as f32 / 100.0;
+        let place = 0.4 + 0.2 * row;
+        photon(
+            place,
+            0.45 + 0.1 * spread(index),
+            0.004,
+            0.1 + spread(3 * index),
+        )
+    });
+    let around: Vec<_> = around.collect();
+    for (features, method, tolerance) in [
+        (wgpu::Features::FLOAT32_BLENDABLE, SplatMethod::Quads, 1e-4),
+        (wgpu::Features::empty(), SplatMethod::Quads, 1e-2),
+    ] {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        // Tiles sum each batch in integers, of which two thousand footprints have plenty.
+        let tiles = options(SplatMethod::Tiles, SplatKernel::Gaussian);
+        for (photons, parts, times) in
+            [(&equal, &equal[..2000], 150.0), (&around, &around[..], 1.0)]
+        {
+            let batches: Vec<_> = parts.chunks(2000).collect();
+            let (part, _) = irradiance(&device, &queue, &tiles, &picture, &batches)?;
+            let expected: Vec<_> = part.iter().map(|it| times * it[0]).collect();
+            let quads = options(method, SplatKernel::Gaussian);
+            let (found, _) = irradiance(&device, &queue, &quads, &picture, &[photons])?;
+            let most = expected.iter().copied().fold(0.0, f32::max);
+            let lit = expected
+                .iter()
+                .zip(&found)
+                .filter(|(it, _)| **it > 1e-3 * most);
+            let off = lit.map(|(expected, found)| (found[0] / expected - 1.0).abs());
+            let off = off.fold(0.0, f32::max);
+            println!("{method:?} {features:?}: off by {off:e}");
+            assert!(off < tolerance, "{method:?} {features:?}: {off:e}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn faint_footprints_are_not_lost_beside_bright_ones() -> Result<(), TestError> {
     let picture = floor()?;
@@ -199,6 +253,37 @@ fn fluxes_at_the_ends_of_the_numbers_stay_right() -> Result<(), TestError> {
                 "{method:?} {watts}: {found}"
             );
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn footprints_that_end_beside_the_picture_add_nothing_to_it() -> Result<(), TestError> {
+    let picture = floor()?;
+    // Light that slants over the picture could reach it above its plane, but not on it.
+    let beside = |pixels: f32| {
+        let out = -pixels / SIZE as f32;
+        let toward_x = Photon {
+            incoming: Vec3::new(-0.8, -0.6, 0.0),
+            ..photon(out, 0.4987, 1e-3, 1.0)
+        };
+        let toward_z = Photon {
+            incoming: Vec3::new(0.0, -0.6, -0.8),
+            ..photon(0.5031, out, 1e-3, 1.0)
+        };
+        [toward_x, toward_z]
+    };
+    let mut photons = vec![photon(0.5031, 0.4987, 1e-3, 1.0)];
+    photons.extend([1.2, 1.4, 1.7, 2.5].map(beside).as_flattened().repeat(10));
+    for (features, method, tolerance) in ways() {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        let options = options(method, SplatKernel::Gaussian);
+        let (found, stats) = irradiance(&device, &queue, &options, &picture, &[&photons])?;
+        let found = flux(&found);
+        assert!((found - 1.0).abs() < tolerance, "{method:?}: {found}");
+        assert_eq!((stats.splatted, stats.outside), (1, 80), "{method:?}");
     }
     Ok(())
 }

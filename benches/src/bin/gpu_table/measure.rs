@@ -363,7 +363,8 @@ fn moved(
     let prepare = landings * (80 + 80 + 40);
     let pairs = u64::from(stats.pairs);
     let sum_bytes = match capabilities.sum_format {
-        wgpu::TextureFormat::Rgba16Float => 8 * u64::from(capabilities.sum_layers),
+        // Two half floats a channel of each layer.
+        wgpu::TextureFormat::Rgba16Float => 16 * u64::from(capabilities.sum_layers),
         _ => 16,
     };
     let splat = match capabilities.splat_method {

@@ -36,13 +36,10 @@ fn splat_draws(@builtin(local_invocation_index) local: u32) {
     if local < LEVELS {
         // The sample that the estimate is made from.
         let all = atomicLoad(&counts.by_level[local]);
-        let sampled = (all + sample_stride(all) - 1u) / sample_stride(all);
-        draws[LEVELS * step.layers + local] = vec4<u32>(4u, sampled, 0u, 0u);
+        draws[LEVELS * step.layers + local] = vec4<u32>(4u, sample_count(all), 0u, 0u);
     }
     let count = atomicLoad(&counts.by_level[local / step.layers]);
-    let each = (count + step.layers - 1u) / step.layers;
-    let first = min(each * (local % step.layers), count);
-    draws[local] = vec4<u32>(4u, min(each, count - first), 0u, 0u);
+    draws[local] = vec4<u32>(4u, (count + step.layers - 1u) / step.layers, 0u, 0u);
 }
 
 var<workgroup> partial: array<f32, 256>;

@@ -90,7 +90,9 @@ fn choose_level(place: ptr<function, SplatPlace>, smallest: f32, least: f32) {
     }
 }
 
-// Writes a footprint that is ready, and returns the peak of its irradiance.
+// Writes a footprint that is ready, and returns the peak of its irradiance. Where no pixel of its level
+// is left of it, it stays without rows, and is not counted: whoever orders footprints skips those
+// without rows, and relies on the counts.
 fn store(
     index: u32,
     d: Density,
@@ -105,6 +107,12 @@ fn store(
     let level = view.levels[place.level];
     place.columns = pixel_range(bounds.low.x, bounds.high.x, stride, level.x);
     place.rows = pixel_range(bounds.low.y, bounds.high.y, stride, level.y);
+    let columns = range_of(place.columns);
+    let rows = range_of(place.rows);
+    if columns.x >= columns.y || rows.x >= rows.y {
+        places[index].rows = 0u;
+        return 0.0;
+    }
     places[index] = place;
     var stored = density_store(d, gate, object);
     stored.flat = flat;
@@ -296,8 +304,13 @@ fn prepare(index: u32, count: u32) -> f32 {
             let g = integral_of(place);
             let middle = select(g.center.yx, g.center, g.strips < 0.0);
             let extent = pixel_gaussian_extent(g);
-            atomicAdd(&counts.splatted, 1u);
+            // Without the blur it may end before the picture begins.
             let box = Bounds(middle - extent, middle + extent, true);
+            if is_outside(box) {
+                atomicAdd(&counts.outside, 1u);
+                return peak;
+            }
+            atomicAdd(&counts.splatted, 1u);
             return peak + store(index, d, gate, record.object, 0.0, box, place);
         }
         if sigma < SMALL_SIGMA {

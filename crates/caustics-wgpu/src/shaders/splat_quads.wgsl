@@ -9,13 +9,8 @@ struct SplatDraw {
     pad: u32,
 }
 
-// 0: sums of 32 bits. 1: half floats, each footprint by its share as the estimate says. 2: the
-// estimate, from a sample of the footprints.
-override QUADS_ROUNDING: u32 = 0u;
-
-// A part of a pixel's sum, in bits, of which everything added is a multiple: two bits less than half
-// floats have, since the estimate may be too low.
-const ROUNDED_BITS: f32 = 9.0;
+// Whether a sample of the footprints is drawn instead of all.
+override QUADS_SAMPLED: bool = false;
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<uniform> quads: SplatDraw;
@@ -25,7 +20,7 @@ const ROUNDED_BITS: f32 = 9.0;
 @group(0) @binding(5) var<storage, read> level_counts: array<u32>;
 @group(0) @binding(6) var texels: texture_2d<u32>;
 @group(0) @binding(7) var<storage, read> splat_scale: SplatScale;
-@group(0) @binding(8) var estimate: texture_2d<f32>;
+@group(0) @binding(8) var units: texture_2d<u32>;
 @group(0) @binding(9) var objects: texture_2d<u32>;
 
 // Where `by_level` starts in `SplatCounts`, in words.
@@ -34,14 +29,8 @@ const BY_LEVEL: u32 = 10u;
 struct Corner {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat, either) index: u32,
-}
-
-// All footprints of the level are drawn, or a sample for the estimate.
-fn drawn_stride() -> u32 {
-    if QUADS_ROUNDING == 2u {
-        return sample_stride(level_counts[BY_LEVEL + quads.level]);
-    }
-    return 1u;
+    // Of a sample, for how many it stands among the few; 0 if it is none of them.
+    @location(1) @interpolate(flat, either) weight: f32,
 }
 
 // A parallelogram around all pixels of a footprint, from its middle to the middles of its sides.
@@ -80,11 +69,23 @@ fn slanted(place: SplatPlace, truncation: Truncation) -> Slanted {
 @vertex
 fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Corner {
     let count = level_counts[BY_LEVEL + quads.level];
-    var first = (count + quads.layers - 1u) / quads.layers * quads.layer;
+    var first = 0u;
     for (var level = 0u; level < quads.level; level++) {
         first += level_counts[BY_LEVEL + level];
     }
-    let index = order[first + drawn_stride() * instance];
+    var at_order = 0u;
+    var weight = 1.0;
+    if QUADS_SAMPLED {
+        at_order = sample_place(instance, count);
+        weight = sparse_weight(instance, count);
+    } else {
+        at_order = layer_place(instance, quads.layer, quads.layers);
+    }
+    if at_order >= count {
+        // No quad at all.
+        return Corner(vec4<f32>(0.0, 0.0, 0.5, 1.0), 0u, 0.0);
+    }
+    let index = order[first + at_order];
     let place = places[index];
     let size = vec2<f32>(view.levels[quads.level].xy);
     let side = vec2<f32>(vec2<u32>(vertex & 1u, vertex >> 1u));
@@ -98,28 +99,14 @@ fn splat_corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
         at = frame.middle + (2.0 * side.x - 1.0) * frame.u + (2.0 * side.y - 1.0) * frame.v;
     }
     let ndc = vec2<f32>(2.0, -2.0) * at / size + vec2<f32>(-1.0, 1.0);
-    return Corner(vec4<f32>(ndc, 0.5, 1.0), index);
+    return Corner(vec4<f32>(ndc, 0.5, 1.0), index, weight);
 }
 
-// A footprint's share of a pixel as a multiple of a unit, of which the pixel's sum has at most 2^11:
-// then no addition rounds, on whatever hardware. It is rounded up or down so that the mean is
-// right, by a sequence that spreads evenly over the footprints of a pixel.
-fn rounded(share: vec3<f32>, pixel: vec2<u32>, index: u32) -> vec3<f32> {
-    let whole = textureLoad(estimate, vec2<i32>(pixel), 0).xyz / f32(quads.layers);
-    // No less than a half float's own last bits.
-    let exponent = ceil(log2(max(max(whole, share), vec3<f32>(1e-6)))) - ROUNDED_BITS;
-    let unit = exp2(max(exponent, vec3<f32>(-24.0)));
-    let start = (pixel.x * 0x9e3779b9u) ^ (pixel.y * 0x85ebca6bu);
-    // The golden ratio's fractional part in 32 bits.
-    let place = f32((start + index * 0x9e3779b9u) >> 8u) / 16777216.0;
-    return unit * floor(share / unit + place);
-}
-
-@fragment
-fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
+// What a footprint adds to a pixel.
+fn share_of(corner: Corner) -> vec3<f32> {
     let texel = textureLoad(texels, vec2<i32>(corner.position.xy), 0);
     if texel.w == NO_RECEIVER {
-        return vec4<f32>(0.0);
+        return vec3<f32>(0.0);
     }
     let stored = densities[corner.index];
     let position = bitcast<vec3<f32>>(texel.xyz);
@@ -134,7 +121,7 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
         is_own,
     );
     if cosine == 0.0 {
-        return vec4<f32>(0.0);
+        return vec3<f32>(0.0);
     }
     let place = places[corner.index];
     var weight = cosine;
@@ -144,12 +131,33 @@ fn splat_fragment(corner: Corner) -> @location(0) vec4<f32> {
     } else {
         weight *= density_kernel(stored, position, view.truncation);
     }
-    let share = splat_scale.scale * weight * stored.strength;
-    if QUADS_ROUNDING == 0u {
-        return vec4<f32>(share, 0.0);
-    }
-    if QUADS_ROUNDING == 2u {
-        return vec4<f32>(f32(drawn_stride()) * share, 0.0);
-    }
-    return vec4<f32>(rounded(share, vec2<u32>(corner.position.xy), corner.index), 0.0);
+    return splat_scale.scale * weight * stored.strength;
+}
+
+@fragment
+fn splat_single(corner: Corner) -> @location(0) vec4<f32> {
+    let pixel = vec2<u32>(corner.position.xy);
+    return vec4<f32>(single(share_of(corner), pixel, corner.index), 0.0);
+}
+
+@fragment
+fn splat_double(corner: Corner) -> Limbs {
+    let pixel = vec2<u32>(corner.position.xy);
+    return limbs(share_of(corner), pixel, corner.index);
+}
+
+// A sample, and how many add to a pixel.
+@fragment
+fn splat_single_sample(corner: Corner) -> @location(0) vec4<f32> {
+    let share = share_of(corner);
+    return select(vec4<f32>(0.0), vec4<f32>(share, 1.0), any(share > vec3<f32>(0.0)));
+}
+
+// The same, and for itself the few, of which half floats lose nothing.
+@fragment
+fn splat_double_sample(corner: Corner) -> Limbs {
+    let share = share_of(corner);
+    let counted = select(vec4<f32>(0.0), vec4<f32>(share, 1.0), any(share > vec3<f32>(0.0)));
+    let few = vec4<f32>(corner.weight * share, select(0.0, counted.w, corner.weight > 0.0));
+    return Limbs(counted, few);
 }

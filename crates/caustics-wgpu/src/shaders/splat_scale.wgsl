@@ -8,11 +8,13 @@ struct SplatScale {
     peak_sum: f32,
 }
 
-// The most footprints that the estimate of the sums is drawn from: if all are on one pixel, half
-// floats still add up.
-const SAMPLE: u32 = 2048u;
+// Numbers that a sum is kept in, each in a layer of its own: one, or two half floats, of which the
+// second has what the first cannot hold.
+override SUM_LIMBS: u32 = 1u;
 
-// One in so many footprints serves for the estimate.
-fn sample_stride(count: u32) -> u32 {
-    return max(16u, (count + SAMPLE - 1u) / SAMPLE);
-}
+// By how much the second is multiplied, since it is far less: a half float's last bit is no finer than
+// 2^-24. With half floats' greatest sum in the first it reaches 32 units of that, and does not overflow.
+const LOW_SCALE: f32 = 32.0;
+
+// What a code of a pixel's unit is above the exponent that it stands for. A code of 0 is none.
+const UNIT_OFFSET: i32 = 128;

@@ -52,7 +52,10 @@ fn splat_upsample(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = vec2<i32>(id.xy);
     var sum = vec3<f32>(0.0);
     for (var layer = 0u; layer < step.layers; layer++) {
-        sum += textureLoad(own, pixel, layer, 0).xyz;
+        sum += textureLoad(own, pixel, SUM_LIMBS * layer, 0).xyz;
+        if SUM_LIMBS > 1u {
+            sum += textureLoad(own, pixel, SUM_LIMBS * layer + 1u, 0).xyz / LOW_SCALE;
+        }
     }
     sum /= splat_scale.scale;
     let packed = textureLoad(texels, pixel, 0).w;
