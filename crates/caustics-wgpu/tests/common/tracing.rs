@@ -61,6 +61,11 @@ impl Stage {
 /// [`trace_plan`] leaves them: checked against the neighbours', where the options ask for it.
 pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
     let Stage { world, rays } = stage;
+    // The shaders do not divide photons at edges.
+    let options = &TraceOptions {
+        divide_edges: false,
+        ..*options
+    };
     let plan = EmissionPlan::new(world, rays, options).unwrap();
     let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
     let mut trails: Vec<_> = (0..plan.count()).map(trail).collect();
