@@ -113,14 +113,14 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
             "{name} {kernel:?} {truncation}: off by {:.2e}, {exact} of {lit} to a thousandth, {counts:?}",
             off / sum
         );
-        // A disc is constant up to its edge: rounding decides which side a point on it is.
-        let tolerance = if kernel == SplatKernel::Disc {
-            5e-3
-        } else {
-            1e-3
-        };
+        // A disc is constant up to its edge: rounding decides which side a point on it is, and one
+        // disc in a focus may be as bright as a percent of all points together.
+        if kernel == SplatKernel::Disc {
+            assert!(f64::from(exact) > 0.998 * f64::from(lit), "{exact} of {lit}");
+            continue;
+        }
         assert!(
-            off < tolerance * sum,
+            off < 1e-3 * sum,
             "{name} {kernel:?} {truncation}: {off} of {sum}"
         );
         assert!(f64::from(exact) > 0.99 * f64::from(lit), "{exact} of {lit}");
