@@ -116,7 +116,10 @@ fn points_are_lit_as_on_the_cpu() -> Result<(), TestError> {
         // A disc is constant up to its edge: rounding decides which side a point on it is, and one
         // disc in a focus may be as bright as a percent of all points together.
         if kernel == SplatKernel::Disc {
-            assert!(f64::from(exact) > 0.998 * f64::from(lit), "{exact} of {lit}");
+            assert!(
+                f64::from(exact) > 0.998 * f64::from(lit),
+                "{exact} of {lit}"
+            );
             continue;
         }
         assert!(
