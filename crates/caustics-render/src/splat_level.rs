@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
-use crate::splat::{PixelIntegral, Prepared, STRIDE, Splat};
+use crate::prepared_splat::{PixelIntegral, Prepared, STRIDE, Splat};
 use crate::surroundings::{Relation, Surroundings, TILE};
 
 /// Rows of one task.
