@@ -1,6 +1,6 @@
 // The map between the pixels of a view and the world, with its derivative, and the part of the screen
 // that a footprint may overlap.
-// CPU twins: `screen.rs` and `Bounds` in `splat.rs` of caustics-render.
+// CPU twins: `screen.rs` and `Bounds` in `splat_bounds.rs` of caustics-render.
 
 struct PixelAxes {
     x: vec3<f32>,

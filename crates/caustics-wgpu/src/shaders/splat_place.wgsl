@@ -1,5 +1,5 @@
 // Where a footprint lies on the screen, and which tiles it touches.
-// CPU twin: `Splat::span` of caustics-render's `splat.rs`.
+// CPU twin: `Splat::span` of caustics-render's `prepared_splat.rs`.
 
 // What lies in a footprint: all pixels of its box; those of its ellipse; those of its ellipse in
 // tiles that show nothing but its receiver in its plane, and all in others; or what a normal

@@ -1,5 +1,5 @@
 // Makes footprints ready for one view: density, level of resolution, pixels.
-// CPU twin: `Splat::prepare` of caustics-render's `splat.rs`.
+// CPU twin: `Splat::prepare` of caustics-render's `prepared_splat.rs`.
 
 // The least standard deviation, in pixels of a level, that may be splatted there.
 const LEVEL_SIGMA: f32 = 2.0;

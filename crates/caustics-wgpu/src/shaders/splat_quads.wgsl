@@ -1,5 +1,5 @@
 // Draws each footprint as a quad and lets the blending unit add them.
-// CPU twin: `Splat::irradiance` of caustics-render's `splat.rs`.
+// CPU twin: `Splat::irradiance` of caustics-render's `prepared_splat.rs`.
 
 // Rust mirror: `SplatDraw`.
 struct SplatDraw {
