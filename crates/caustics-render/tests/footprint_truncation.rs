@@ -66,9 +66,10 @@ fn floor() -> GBuffer {
     GBuffer::new(&world, &intersector, &camera, PIXELS, PIXELS).expect("valid")
 }
 
-/// Photons all over the middle of the floor, none at the same place of its pixel as another.
+/// Photons all over the middle of the floor, none at the same place of its pixel as another: so many
+/// that what a Gaussian that ends at one deviation has more or less by its place averages out.
 fn spread(axes: [Vec3; 2], coverage: Coverage) -> Vec<Photon> {
-    (0..1000)
+    (0..4000)
         .map(|index| {
             // The generalised golden ratio's multiples.
             let place = (index as f32 * Vec2::new(0.754_877_7, 0.569_840_3)).fract() - 0.5;
