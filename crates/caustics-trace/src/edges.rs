@@ -1,11 +1,11 @@
 use std::ops::Range;
 
 use caustics_accel::Intersect;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 
 use crate::emission::EmissionSample;
 use crate::ledger::EnergyLedger;
-use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO};
+use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO, in_plane};
 use crate::path_guide::PathGuide;
 use crate::photon::{FootprintSource, Photon};
 use crate::silhouette::Silhouette;
@@ -265,12 +265,6 @@ fn checked_ratio(photon: &Photon, axis: usize, pair: &[Option<&Photon>; 2]) -> f
         Some(farthest) if length > LIMIT * farthest => farthest / length,
         _ => 1.0,
     }
-}
-
-/// From where a photon landed to where another did, in its receiver's plane.
-fn in_plane(photon: &Photon, other: &Photon) -> Vec3 {
-    let displacement = other.position - photon.position;
-    displacement - photon.normal * displacement.dot(photon.normal)
 }
 
 /// A part of the light of a row's last photon.

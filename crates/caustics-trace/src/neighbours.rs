@@ -144,6 +144,12 @@ impl Halfway {
     }
 }
 
+/// From where a photon landed to where another did, in its receiver's plane.
+pub(crate) fn in_plane(photon: &Photon, other: &Photon) -> Vec3 {
+    let displacement = other.position - photon.position;
+    displacement - photon.normal * displacement.dot(photon.normal)
+}
+
 enum Edge {
     Even,
     Silhouette(Silhouette),
@@ -154,13 +160,9 @@ impl Landed {
     /// object: past a corner light goes on, on a receiver whose plane says nothing about this one.
     fn of(photon: &Photon, number: usize, pair: &[Option<&Photon>; 2]) -> Option<Self> {
         let axis = photon.axes[number];
-        let in_plane = |neighbour: &Photon| {
-            let displacement = neighbour.position - photon.position;
-            displacement - photon.normal * displacement.dot(photon.normal)
-        };
         let steps = pair.map(|it| {
             let neighbour = it.filter(|it| it.object == photon.object)?;
-            Some((in_plane(neighbour), neighbour.axes[number]))
+            Some((in_plane(photon, neighbour), neighbour.axes[number]))
         });
         let (farthest, beside) = steps
             .into_iter()

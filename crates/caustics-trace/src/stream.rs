@@ -14,8 +14,8 @@ use crate::traced::Traced;
 ///
 /// All parts together are what [`trace_plan`](crate::trace_plan) gives at once, photons and ledger,
 /// footprints checked against their neighbours and divided at edges included; only of rays there are a
-/// few more, since each part finds anew the ways of the paths that end in it. For that the last rows of a lattice wait for
-/// the ones after them: what comes out of a part are the photons that have met all their neighbours,
+/// few more, since each part finds anew the ways of the paths that end in it. For that the last rows of
+/// a lattice wait for the ones after them: what comes out of a part are the photons that have met all their neighbours,
 /// and what stays in memory is three rows at most, besides the last part.
 ///
 /// ```

@@ -10,7 +10,7 @@ use caustics_trace::{
     trace_photons,
 };
 
-use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
+use common::scenes::{add_floor, add_mesh, ball_over_floor, flattened};
 
 fn trace(scene: &Scene, options: &TraceOptions) -> PhotonMap {
     let (world, intersector) = flattened(scene);
@@ -20,10 +20,11 @@ fn trace(scene: &Scene, options: &TraceOptions) -> PhotonMap {
 /// Half the sides of a mirror.
 const HALVES: [f32; 2] = [0.31, 0.2];
 
-/// Where the mirror hangs, from which light comes straight down on it.
+/// Where the mirror hangs, below a lamp and a ceiling.
 const HEIGHT: f32 = 2.0;
 
-/// A flat mirror, turned by some angles, under a sun: its corners, and the scene.
+/// A flat mirror, turned by some angles, that throws a lamp's light at the ceiling: the scene, and the
+/// mirror's corners.
 fn mirror(roll: f32) -> (Scene, [Vec3; 4]) {
     let turned = Quat::from_rotation_x(0.4) * Quat::from_rotation_y(roll);
     let corner = |x: f32, z: f32| HEIGHT * Vec3::Y + turned * Vec3::new(x, 0.0, z);
@@ -33,7 +34,6 @@ fn mirror(roll: f32) -> (Scene, [Vec3; 4]) {
     let mut scene = Scene::new();
     let metal = Material::metal("metal", [0.9; 3]);
     add_mesh(&mut scene, "mirror", mesh.expect("a valid mirror"), metal);
-    // A ceiling, which the light passes by: it shines from below it.
     let ceiling =
         caustics_geometry::shapes::quad(Vec3::new(-9.0, 3.0, -9.0), 18.0 * Vec3::X, 18.0 * Vec3::Z);
     let white = Material::diffuse("white", [0.8; 3]);
@@ -43,8 +43,8 @@ fn mirror(roll: f32) -> (Scene, [Vec3; 4]) {
         ceiling.expect("a valid ceiling"),
         white,
     );
-    let spot = Light::point([0.0, 2.9, 0.0], [10.0; 3]).expect("a valid lamp");
-    scene.add_light(spot).expect("a valid lamp");
+    let lamp = Light::point([0.0, 2.9, 0.0], [10.0; 3]).expect("a valid lamp");
+    scene.add_light(lamp).expect("a valid lamp");
     (scene, corners)
 }
 
@@ -152,16 +152,7 @@ fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
 
 #[test]
 fn what_is_divided_is_counted_and_nothing_is_where_the_rest_stays() {
-    let mut scene = Scene::new();
-    add_floor(&mut scene, -0.6, 4.0);
-    add_sphere(
-        &mut scene,
-        Vec3::ZERO,
-        0.5,
-        Material::dielectric("glass", 1.5),
-    );
-    let lamp = Light::point([0.0, 3.0, 0.0], [10.0; 3]).expect("a valid lamp");
-    scene.add_light(lamp).expect("a valid lamp");
+    let scene = ball_over_floor();
     let options = TraceOptions {
         photons: 10_000,
         ..TraceOptions::default()

@@ -2,25 +2,14 @@
 
 mod common;
 
-use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{DVec3, Vec3};
 use caustics_trace::{Fate, FootprintSource, PhotonMap, TraceOptions, trace_photons};
 
-use common::scenes::{add_floor, add_sphere, flattened};
+use common::scenes::{ball_over_floor, flattened};
 
-/// A glass ball over a floor, seen by a lamp: its outline is a silhouette all around.
+/// The ball's outline is a silhouette all around.
 fn trace(check_footprints: bool, photons: u32) -> PhotonMap {
-    let mut scene = Scene::new();
-    add_floor(&mut scene, -0.6, 4.0);
-    add_sphere(
-        &mut scene,
-        Vec3::ZERO,
-        0.5,
-        Material::dielectric("glass", 1.5),
-    );
-    let lamp = Light::point([0.0, 3.0, 0.0], [10.0; 3]).expect("valid");
-    scene.add_light(lamp).expect("valid");
-    let (world, intersector) = flattened(&scene);
+    let (world, intersector) = flattened(&ball_over_floor());
     let options = TraceOptions {
         photons,
         check_footprints,

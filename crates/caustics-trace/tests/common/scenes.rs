@@ -43,6 +43,17 @@ pub(crate) fn add_floor(scene: &mut Scene, height: f32, half: f32) {
     add_mesh(scene, "floor", mesh, Material::diffuse("white", [0.8; 3]));
 }
 
+/// A glass ball of half a metre over a floor, a lamp above.
+pub(crate) fn ball_over_floor() -> Scene {
+    let mut scene = Scene::new();
+    add_floor(&mut scene, -0.6, 4.0);
+    let glass = Material::dielectric("glass", 1.5);
+    add_sphere(&mut scene, Vec3::ZERO, 0.5, glass);
+    let lamp = Light::point([0.0, 3.0, 0.0], [10.0; 3]).expect("a valid lamp");
+    scene.add_light(lamp).expect("a valid lamp");
+    scene
+}
+
 pub(crate) fn flattened(scene: &Scene) -> (World, SceneIntersector) {
     let world = World::new(scene).expect("a small world");
     let intersector = world
