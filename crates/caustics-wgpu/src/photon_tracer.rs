@@ -22,7 +22,8 @@ use crate::tracer_shaders::{
 type Traced = (Dispatch, wgpu::Buffer, wgpu::BindGroup, bool);
 
 /// Traces photons on the GPU: emission, flight and landing in one dispatch, one photon to an
-/// invocation; then their records are put in order, and their footprints checked.
+/// invocation; then those at the edges of sheets of light are divided, all records are put in order, and
+/// their footprints checked.
 ///
 /// It binds eight storage buffers, as many as WebGPU's default limits allow.
 #[derive(Clone, Debug)]
