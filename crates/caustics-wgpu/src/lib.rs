@@ -138,7 +138,7 @@
 //! host's depth. Footprints of one batch fit one binding, 0.8 million in 128 MiB; more are several
 //! batches. A view takes 70 bytes a pixel, 92 where tiles sum several batches, 76 where quads are
 //! blended in 32 bits, and 140 in half floats and four layers, at 1920 by 1080; and a footprint of the
-//! largest batch 280. On a browser's device, errors arrive after the call that caused them, and
+//! largest batch 272. On a browser's device, errors arrive after the call that caused them, and
 //! go to the host's handlers.
 //!
 //! What is summed is irradiance: enough for a matt receiver, but not for a glossy one, whose light

@@ -173,7 +173,7 @@ impl PhotonTracer {
             dispatch(&mut pass, part.photons.len() as u32, WORKGROUP_SIZE);
         }
         drop(pass);
-        self.divide(recorder, plan, &dispatches, into);
+        self.divide(device, recorder, plan, &dispatches, into)?;
         let own = dispatches.iter().filter(|(.., is_own)| *is_own);
         let parts: Vec<_> = own
             .map(|(part, uniform, ..)| (uniform, part.photons.len() as u32))
@@ -187,32 +187,48 @@ impl PhotonTracer {
     /// asks for it.
     fn divide(
         &self,
+        device: &wgpu::Device,
         recorder: &mut Recorder<'_>,
         plan: &TracePlan,
         dispatches: &[Traced],
         into: &PhotonBuffers,
-    ) {
+    ) -> Result<(), RendererError> {
         let divided: Vec<_> = dispatches
             .iter()
             .filter(|(part, .., is_own)| *is_own && plan.divides_edges(part.dimensions))
             .collect();
         if divided.is_empty() {
-            return;
+            return Ok(());
         }
-        let edges = 4 * TraceCounters::EDGES as u64;
+        let counter = |number: usize| 4 * number as u64;
+        let edges = counter(TraceCounters::EDGES);
         recorder
             .encoder
-            .clear_buffer(&into.counters, edges, Some(4));
-        let mut pass = recorder.compute("edges", 2 * divided.len() as u32);
+            .clear_buffer(&into.counters, edges, Some(8));
+        let mut pass = recorder.compute("edges", divided.len() as u32);
         pass.set_pipeline(&self.mark);
         for (part, _, group, _) in &divided {
             pass.set_bind_group(0, group, &[]);
             dispatch(&mut pass, part.photons.len() as u32, EDGE_WORKGROUP_SIZE);
         }
+        drop(pass);
+        // As many workgroups as there are edges for.
+        let groups = filled_buffer(
+            device,
+            "workgroups of edges",
+            wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
+            bytemuck::cast_slice(&[0u32, 1, 1]),
+        )?;
+        let found = counter(TraceCounters::EDGE_GROUPS);
+        recorder
+            .encoder
+            .copy_buffer_to_buffer(&into.counters, found, &groups, 0, 4);
+        let mut pass = recorder.compute("division", divided.len() as u32);
         pass.set_pipeline(&self.divide);
         for (_, _, group, _) in &divided {
             pass.set_bind_group(0, group, &[]);
-            dispatch(&mut pass, into.capacity(), EDGE_WORKGROUP_SIZE);
+            pass.dispatch_workgroups_indirect(&groups, 0);
         }
+        Ok(())
     }
 }

@@ -29,6 +29,7 @@ impl TraceCounters {
     pub(crate) const REPLACED: usize = 20;
     pub(crate) const DIVIDED: usize = 21;
     pub(crate) const EDGES: usize = 22;
+    pub(crate) const EDGE_GROUPS: usize = 23;
     pub(crate) const SUMS: usize = 24;
 
     /// The fates in the order of the shader's lines, which further ones follow.

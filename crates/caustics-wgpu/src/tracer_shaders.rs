@@ -6,8 +6,8 @@ use crate::shader::{FOOTPRINT_RECORD, Shader, shader_piece};
 /// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
 pub(crate) const WORKGROUP_SIZE: u32 = 64;
 
-/// Photons or records of one workgroup of [`MARK`] and of [`DIVIDERS`]. Mirrors the constants in
-/// `shaders/mark_edges.wgsl` and `shaders/divide_photons.wgsl`.
+/// Photons or records of one workgroup of [`MARK`] and of [`DIVIDERS`]. Mirrors the constant in
+/// `shaders/edge_rows.wgsl`.
 pub(crate) const EDGE_WORKGROUP_SIZE: u32 = 64;
 
 /// Words that link a record. Mirrors the constant in `shaders/photon_links.wgsl`.
@@ -398,6 +398,7 @@ mod tests {
             ("COUNTER_REPLACED", TraceCounters::REPLACED),
             ("COUNTER_DIVIDED", TraceCounters::DIVIDED),
             ("COUNTER_EDGES", TraceCounters::EDGES),
+            ("COUNTER_EDGE_GROUPS", TraceCounters::EDGE_GROUPS),
             ("COUNTER_SUMS", TraceCounters::SUMS),
             ("FATE_CROWDED", TraceCounters::CROWDED),
             ("LINE_EMITTED", TraceCounters::EMITTED),

@@ -60,7 +60,7 @@ fn batches_have_the_photons_of_one_run() {
             .unwrap();
         // Its photons, those beside it, two for edges, and five for their order.
         let beside = u32::from(batch.start > 0) + u32::from(batch.end < PHOTONS);
-        assert_eq!((work.passes, work.dispatches), (3, 1 + beside + 2 + 5));
+        assert_eq!((work.passes, work.dispatches), (4, 1 + beside + 2 + 5));
         queue.submit([encoder.finish()]);
         photons.extend(records_of(device, queue, &buffers, batch));
     }

@@ -1,7 +1,5 @@
 // The last photons of a lattice's rows, divided. Twin: edges.rs in caustics-trace, which says why.
 
-const DIVIDE_WORKGROUP_SIZE: u32 = 64u;
-
 // How often the stretch in which a row's end lies is halved.
 const HALVINGS: u32 = 3u;
 const LAST_WIDTH: f32 = 0.0625;
@@ -237,14 +235,15 @@ fn divide_record(place: u32) {
     atomicAdd(&group_divided, 1u);
 }
 
-@compute @workgroup_size(DIVIDE_WORKGROUP_SIZE)
+@compute @workgroup_size(EDGE_WORKGROUP_SIZE)
 fn divide_photons(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32,
 ) {
-    let index = (group.y * groups.x + group.x) * DIVIDE_WORKGROUP_SIZE + invocation;
-    if index < atomicLoad(&counters[COUNTER_EDGES]) {
+    let edges = atomicLoad(&counters[COUNTER_EDGES]);
+    let stride = EDGE_WORKGROUP_SIZE * groups.x;
+    for (var index = group.x * EDGE_WORKGROUP_SIZE + invocation; index < edges; index += stride) {
         divide_record(links[trace.first_edge + index]);
     }
     workgroupBarrier();

@@ -1,5 +1,7 @@
 // Rows of a lattice that end. Twin: edges.rs in caustics-trace.
 
+const EDGE_WORKGROUP_SIZE: u32 = 64u;
+
 // Whether the photon's path ends beside it and goes on behind it, along the axis of these neighbours.
 fn is_end(photon: FootprintRecord, pair: array<Landed, 2>) -> bool {
     let behind = inner_of(pair);

@@ -35,6 +35,8 @@ const COUNTER_REPLACED: u32 = 20u;
 const COUNTER_DIVIDED: u32 = 21u;
 // Records of the batch that stand at the edge of a sheet of light.
 const COUNTER_EDGES: u32 = 22u;
+// Workgroups that divide them.
+const COUNTER_EDGE_GROUPS: u32 = 23u;
 const COUNTER_SUMS: u32 = 24u;
 const COUNTERS: u32 = 114u;
 

@@ -1,7 +1,8 @@
 // Finds the last photons of a lattice's rows, which are then divided. Twin: `EdgeTracer::check` in
 // edges.rs of caustics-trace, which says why.
 
-const MARK_WORKGROUP_SIZE: u32 = 64u;
+// Workgroups of one dispatch at most; further records are theirs in turn.
+const MAX_EDGE_GROUPS: u32 = 32768u;
 
 // Photons with less than this part of the flux of their point's brightest are not divided.
 const SIGNIFICANT: f32 = 0.1;
@@ -28,20 +29,25 @@ fn mark_photon(photon: u32) {
             && largest(flux_of(record)) >= SIGNIFICANT * brightest {
             let landings = landed_beside(beside, links[link + 1u]);
             if is_end(record, landings[0]) || is_end(record, landings[1]) {
-                links[trace.first_edge + atomicAdd(&counters[COUNTER_EDGES], 1u)] = place;
+                let index = atomicAdd(&counters[COUNTER_EDGES], 1u);
+                links[trace.first_edge + index] = place;
+                if index % EDGE_WORKGROUP_SIZE == 0u
+                    && index / EDGE_WORKGROUP_SIZE < MAX_EDGE_GROUPS {
+                    atomicAdd(&counters[COUNTER_EDGE_GROUPS], 1u);
+                }
             }
         }
         place = before & LINK_PLACE;
     }
 }
 
-@compute @workgroup_size(MARK_WORKGROUP_SIZE)
+@compute @workgroup_size(EDGE_WORKGROUP_SIZE)
 fn mark_edges(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) invocation: u32,
 ) {
-    let index = (group.y * groups.x + group.x) * MARK_WORKGROUP_SIZE + invocation;
+    let index = (group.y * groups.x + group.x) * EDGE_WORKGROUP_SIZE + invocation;
     if index < trace.count {
         mark_photon(trace.first + index);
     }
