@@ -12,14 +12,16 @@ use crate::silhouette::Silhouette;
 use crate::trace::Batch;
 use crate::tracer::PathTracer;
 
-/// How often the stretch in which a row's end lies is halved: it is known to a sixteenth of a cell
-/// then, which is the most that the narrowest stratum can do with.
-const HALVINGS: u32 = 3;
+/// How often the stretch in which a row's end lies is halved: it is known to a part in 32 of a cell
+/// then, which is the most that the narrowest stratum can do with. Where rows end in both axes, one
+/// halving less often takes the wrong one, and the edge has teeth.
+const HALVINGS: u32 = 4;
 
 /// The strata that the light of a row's last photon is divided into, from the inside to the edge, in
 /// parts of it. In steps of two, since the sum of footprints is uneven where their widths differ by
 /// more.
-const STRATA: [(f32, f32); 3] = [(0.0, 0.5), (0.5, 0.75), (0.75, 1.0)];
+const STRATA: [(f32, f32); PARTS] = [(0.0, 0.5), (0.5, 0.75), (0.75, 0.875), (0.875, 1.0)];
+const PARTS: usize = 4;
 
 /// Photons with less than this part of the flux of their cell's brightest are not divided.
 const SIGNIFICANT: f32 = 0.1;
@@ -162,7 +164,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
                 slant: 0.5 * (low + high) * slant,
             })
         });
-        let [Some(first), Some(second), Some(last)] = strata else {
+        let Some(strata) = strata.into_iter().collect::<Option<Vec<_>>>() else {
             return false;
         };
         let across = 1 - row.axis;
@@ -172,26 +174,27 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         } else {
             1.0
         };
-        let before = Stratum {
-            photon: *inner,
-            at: -1.0,
-            ..first
-        };
         let edge = Edge {
             axis: row.axis,
             sign: row.sign,
             narrowing,
         };
-        let parts = [
-            edge.footprint(&first, &before, Some(&second)),
-            edge.footprint(&second, &first, Some(&last)),
-            edge.footprint(&last, &second, None),
-        ];
-        let are_finite = parts
+        let mut before = Stratum {
+            photon: *inner,
+            at: -1.0,
+            width: 1.0,
+            slant: 0.0,
+        };
+        let first = divided.len();
+        for (number, stratum) in strata.iter().enumerate() {
+            divided.push(edge.footprint(stratum, &before, strata.get(number + 1)));
+            before = *stratum;
+        }
+        let are_finite = divided[first..]
             .iter()
             .all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));
-        if are_finite {
-            divided.extend(parts);
+        if !are_finite {
+            divided.truncate(first);
         }
         are_finite
     }

@@ -170,11 +170,11 @@ fn what_is_divided_is_counted_and_nothing_is_where_the_rest_stays() {
     };
     let ledger = &divided.ledger;
     assert!(ledger.divided_photons > 100);
-    assert_eq!(parts(&divided), 3 * ledger.divided_photons);
+    assert_eq!(parts(&divided), 4 * ledger.divided_photons);
     assert_eq!((parts(&whole), whole.ledger.divided_photons), (0, 0));
     assert_eq!(
         divided.photons.len() as u64,
-        whole.photons.len() as u64 + 2 * ledger.divided_photons
+        whole.photons.len() as u64 + 3 * ledger.divided_photons
     );
     assert_eq!(
         ledger.entry(Fate::Stored).count,
@@ -268,6 +268,6 @@ fn colours_of_dispersing_glass_have_edges_of_their_own() {
             "{channel}: {}",
             divided.len()
         );
-        assert_eq!(divided.len() % 3, 0);
+        assert_eq!(divided.len() % 4, 0);
     }
 }

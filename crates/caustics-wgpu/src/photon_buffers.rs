@@ -43,7 +43,7 @@ pub(crate) struct TraceScratch {
 impl PhotonBuffers {
     /// Room for `capacity` records of a batch of `photons`. A photon that is split at every surface
     /// stores two to four records in common scenes; one that is divided at the edge of a sheet of light
-    /// takes three further places, which are a few hundredths of all.
+    /// takes four further places, which are a few hundredths of all.
     ///
     /// # Errors
     /// [`BufferTooLarge`](crate::GpuError::BufferTooLarge), as [`RendererError::Gpu`]: 128 MiB hold

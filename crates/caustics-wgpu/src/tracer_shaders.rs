@@ -14,7 +14,7 @@ pub(crate) const EDGE_WORKGROUP_SIZE: u32 = 64;
 pub(crate) const LINK_WORDS: u32 = 3;
 
 /// The parts of a divided photon, likewise.
-pub(crate) const PARTS: u32 = 3;
+pub(crate) const PARTS: u32 = 4;
 
 /// Which hierarchy rays traverse. Both give the same hits.
 ///

@@ -1,11 +1,11 @@
 // The last photons of a lattice's rows, divided. Twin: edges.rs in caustics-trace, which says why.
 
 // How often the stretch in which a row's end lies is halved.
-const HALVINGS: u32 = 3u;
-const LAST_WIDTH: f32 = 0.0625;
+const HALVINGS: u32 = 4u;
 
 // Where in a row's last cell each part begins and ends, from the inside to the edge.
-const STRATA: array<vec2<f32>, PARTS> = array(vec2(0.0, 0.5), vec2(0.5, 0.75), vec2(0.75, 1.0));
+const STRATA: array<vec2<f32>, PARTS> = array(
+    vec2(0.0, 0.5), vec2(0.5, 0.75), vec2(0.75, 0.875), vec2(0.875, 1.0));
 
 // A row, and how far it goes from its last point, in cells.
 struct Row {

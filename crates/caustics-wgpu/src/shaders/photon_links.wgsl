@@ -13,7 +13,7 @@ const LINK_THINNED: u32 = 0x80000000u;
 const LINK_DIVIDED: u32 = 0x80000000u;
 
 // The parts of a photon that is divided. Twin: the length of `STRATA` in edges.rs of caustics-trace.
-const PARTS: u32 = 3u;
+const PARTS: u32 = 4u;
 
 // Where the words of the record before a place are.
 fn link_of(first_link: u32, place: u32) -> u32 {

@@ -76,7 +76,7 @@ pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<Photon
             assert!(is_divided || photon.incoming == first.incoming);
             let mut parts = vec![first];
             if is_divided {
-                parts.extend(checked.by_ref().take(2));
+                parts.extend(checked.by_ref().take(3));
             }
             let after: DVec3 = parts.iter().map(|it| it.flux.as_dvec3()).sum();
             let gain = after - photon.flux.as_dvec3();
