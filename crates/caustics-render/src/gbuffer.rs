@@ -5,10 +5,8 @@ use glam::Vec3;
 
 use crate::error::RenderError;
 use crate::picture::PictureOptions;
+use crate::pixel_samples::PixelSamples;
 use crate::screen::Screen;
-
-/// Samples along each side of a pixel that holds an edge.
-const EDGE_SAMPLES: u32 = 4;
 
 /// The least cosine between the normals of two samples of one smooth surface.
 const SMOOTH_COSINE: f32 = 0.98;
@@ -24,6 +22,8 @@ pub struct Texel {
     pub shading_normal: Vec3,
     /// The part of the pixel that it fills.
     pub coverage: f32,
+    /// Where in the pixel that is.
+    pub(crate) samples: PixelSamples,
     /// Index among the world's materials.
     pub material: u32,
     /// Index among the world's objects.
@@ -89,7 +89,7 @@ impl GBuffer {
             rays: centers.len() as u64,
         };
         for (pixel, parts) in refined.into_iter().flatten() {
-            buffer.rays += u64::from(EDGE_SAMPLES * EDGE_SAMPLES);
+            buffer.rays += PixelSamples::COUNT as u64;
             let mut parts = parts.into_iter();
             buffer.texels[pixel as usize] = parts.next();
             buffer.extras.extend(parts.map(|part| (pixel, part)));
@@ -168,6 +168,7 @@ impl<I: Intersect + ?Sized> Looker<'_, I> {
             normal: side * point.geometric_normal,
             shading_normal: side * point.shading_normal,
             coverage: 1.0,
+            samples: PixelSamples::ALL,
             material: point.material,
             object: point.object,
         };
@@ -191,32 +192,30 @@ impl<I: Intersect + ?Sized> Looker<'_, I> {
     }
 
     fn parts(&self, x: u32, y: u32) -> Vec<Texel> {
-        let mut parts: Vec<(Texel, u32)> = Vec::new();
-        let step = 1.0 / EDGE_SAMPLES as f32;
-        for sample in 0..EDGE_SAMPLES * EDGE_SAMPLES {
-            let column = (sample % EDGE_SAMPLES) as f32 + 0.5;
-            let row = (sample / EDGE_SAMPLES) as f32 + 0.5;
-            let Some(seen) = self.look(x as f32 + column * step, y as f32 + row * step) else {
+        let mut parts: Vec<Texel> = Vec::new();
+        for sample in 0..PixelSamples::COUNT {
+            let place = PixelSamples::place(sample);
+            let Some(mut seen) = self.look(x as f32 + place.x, y as f32 + place.y) else {
                 continue;
             };
-            match parts.iter_mut().find(|(part, _)| part.is_like(&seen)) {
-                Some((part, count)) => {
+            match parts.iter_mut().find(|part| part.is_like(&seen)) {
+                Some(part) => {
                     part.position += seen.position;
-                    *count += 1;
+                    part.samples.insert(sample);
                 }
-                None => parts.push((seen, 1)),
+                None => {
+                    seen.samples = PixelSamples::default();
+                    seen.samples.insert(sample);
+                    parts.push(seen);
+                }
             }
         }
-        parts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-        let share = step * step;
+        parts.sort_by_key(|part| std::cmp::Reverse(part.samples.count()));
+        for part in &mut parts {
+            part.position /= part.samples.count() as f32;
+            part.coverage = part.samples.coverage();
+        }
         parts
-            .into_iter()
-            .map(|(part, count)| Texel {
-                position: part.position / count as f32,
-                coverage: count as f32 * share,
-                ..part
-            })
-            .collect()
     }
 }
 

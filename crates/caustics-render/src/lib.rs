@@ -101,6 +101,7 @@ mod nearest;
 mod picture;
 mod pixel;
 mod pixel_integral;
+mod pixel_samples;
 mod prepared_splat;
 mod screen;
 mod splat;

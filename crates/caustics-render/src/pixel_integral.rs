@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 use glam::Vec2;
 
 use crate::covariance::Covariance;
+use crate::pixel_samples::PixelSamples;
 
 /// Where the normal distribution ends, in standard deviations.
 const CUT: f32 = 3.0;
@@ -178,12 +179,41 @@ impl PixelGaussian {
         }
     }
 
-    /// The part of the flux that one pixel gets.
-    pub(crate) fn weight(&self, column: usize, row: usize, weights: &mut Vec<f32>) -> f32 {
+    /// The part of the flux that one pixel gets where these of its samples are.
+    pub(crate) fn part(
+        &self,
+        column: usize,
+        row: usize,
+        samples: PixelSamples,
+        weights: &mut Vec<f32>,
+    ) -> f32 {
         let mut found = 0.0;
-        let (columns, rows) = (column..column + 1, row..row + 1);
-        self.light_pixels(&columns, &rows, weights, |_, _, weight| found = weight);
+        if samples == PixelSamples::ALL {
+            let (columns, rows) = (column..column + 1, row..row + 1);
+            self.light_pixels(&columns, &rows, weights, |_, _, weight| found = weight);
+            return found;
+        }
+        let [first_column, first_row] = [column, row].map(|it| it * PixelSamples::SIDE);
+        let columns = first_column..first_column + PixelSamples::SIDE;
+        let rows = first_row..first_row + PixelSamples::SIDE;
+        let finer = self.enlarged(PixelSamples::SIDE as f32);
+        finer.light_pixels(&columns, &rows, weights, |column, row, weight| {
+            if samples.has(column - first_column, row - first_row) {
+                found += weight;
+            }
+        });
         found
+    }
+
+    /// In smaller pixels, so many along the side of each.
+    fn enlarged(&self, times: f32) -> Self {
+        Self {
+            center: times * self.center,
+            long: times * self.long,
+            short: times * self.short,
+            strips: (self.strips / times).max(1.0),
+            ..*self
+        }
     }
 }
 
@@ -320,6 +350,48 @@ mod tests {
         }
 
         #[test]
+        fn parts_of_a_pixel_are_as_the_whole(
+            x in 4.5f32..7.5,
+            y in 4.5f32..7.5,
+            long in 0.02f32..1.5,
+            ratio in 0.05f32..1.0,
+            angle in 0.0f32..3.2,
+            cut in 0usize..65,
+        ) {
+            // A pixel whose first samples are one surface's and whose others are another's.
+            let covariance = turned(long, ratio * long, angle);
+            let gaussian = PixelGaussian::new(Vec2::new(x, y), &covariance);
+            let mut sides = [PixelSamples::default(); 2];
+            for sample in 0..PixelSamples::COUNT {
+                sides[usize::from(sample >= cut)].insert(sample);
+            }
+            prop_assume!(sides.iter().all(|it| *it != PixelSamples::ALL));
+            let mut weights = Vec::new();
+            let [one, other] = sides.map(|it| gaussian.part(6, 6, it, &mut weights));
+            let whole = gaussian.part(6, 6, PixelSamples::ALL, &mut weights);
+            prop_assert!((one + other - whole).abs() < 0.02, "{one} + {other} for {whole}");
+            // By the integral over the rows of samples that are whole.
+            let rows = cut / PixelSamples::SIDE;
+            let mut above = PixelSamples::default();
+            for sample in 0..rows * PixelSamples::SIDE {
+                above.insert(sample);
+            }
+            let scale = PixelSamples::SIDE as f32;
+            let finer = by_sum(
+                scale * (Vec2::new(x, y) - 6.0),
+                &Covariance {
+                    xx: scale * scale * covariance.xx,
+                    xy: scale * scale * covariance.xy,
+                    yy: scale * scale * covariance.yy,
+                },
+                PixelSamples::SIDE,
+            );
+            let expected: f64 = finer[..rows * PixelSamples::SIDE].iter().sum();
+            let found = gaussian.part(6, 6, above, &mut weights);
+            prop_assert!((f64::from(found) - expected).abs() < 0.02, "{found} for {expected}");
+        }
+
+        #[test]
         fn pieces_are_as_the_whole(
             x in 3.0f32..7.0,
             y in 3.0f32..7.0,
@@ -338,7 +410,7 @@ mod tests {
                 prop_assert!((piece - whole).abs() < 1e-6);
             }
             for (pixel, whole) in whole.iter().enumerate() {
-                let one = gaussian.weight(pixel % 10, pixel / 10, &mut Vec::new());
+                let one = gaussian.part(pixel % 10, pixel / 10, PixelSamples::ALL, &mut Vec::new());
                 prop_assert!((one - whole).abs() < 1e-6);
             }
         }

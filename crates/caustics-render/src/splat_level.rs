@@ -7,6 +7,7 @@ use std::ops::Range;
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
+use crate::pixel_samples::PixelSamples;
 use crate::prepared_splat::{PixelIntegral, Prepared, STRIDE, Splat};
 use crate::surroundings::{Relation, Surroundings, TILE};
 
@@ -349,7 +350,7 @@ struct BandTask<'a> {
 impl BandTask<'_> {
     fn run(mut self, prepared: &[Prepared]) {
         let rows = self.light.x.len() / self.width;
-        let mut weights = Vec::new();
+        let mut weights = [Vec::new(), Vec::new()];
         for &index in self.splats {
             let Prepared::Splat(splat) = &prepared[index as usize] else {
                 continue;
@@ -392,7 +393,7 @@ impl BandTask<'_> {
         splat: &Splat,
         integral: &PixelIntegral,
         rows: Range<usize>,
-        weights: &mut Vec<f32>,
+        [weights, part_weights]: &mut [Vec<f32>; 2],
     ) {
         let columns = usize::from(splat.columns[0])..usize::from(splat.columns[1]);
         if rows.is_empty() || columns.is_empty() {
@@ -400,14 +401,18 @@ impl BandTask<'_> {
         }
         let (texels, light) = (self.texels, &mut self.light);
         let (width, first) = (self.width, self.first_row);
-        integral
-            .gaussian
-            .light_pixels(&columns, &rows, weights, |column, row, weight| {
-                if let Some(texel) = &texels[row * width + column] {
-                    let target = (row - first) * width + column;
-                    light.add(target, splat.integrated(integral, texel, weight));
-                }
-            });
+        let gaussian = &integral.gaussian;
+        gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
+            if let Some(texel) = &texels[row * width + column] {
+                let target = (row - first) * width + column;
+                let weight = if texel.samples == PixelSamples::ALL {
+                    weight
+                } else {
+                    gaussian.part(column, row, texel.samples, part_weights) / texel.coverage
+                };
+                light.add(target, splat.integrated(integral, texel, weight));
+            }
+        });
         let begin = |row: usize| {
             self.extras
                 .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
@@ -416,9 +421,10 @@ impl BandTask<'_> {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
             if columns.contains(&column) {
-                let weight = integral.gaussian.weight(column, row, weights);
+                let weight = gaussian.part(column, row, texel.samples, weights);
                 if weight > 0.0 {
-                    self.extra_light[index] += splat.integrated(integral, texel, weight);
+                    self.extra_light[index] +=
+                        splat.integrated(integral, texel, weight / texel.coverage);
                 }
             }
         }

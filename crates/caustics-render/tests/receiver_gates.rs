@@ -1,7 +1,7 @@
 //! What footprints light beside, above, below and behind their receivers, in splat and gather.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use caustics_accel::BvhOptions;
+use caustics_accel::{BvhOptions, Intersect};
 use caustics_geometry::shapes;
 use caustics_render::{EyeTracer, FootprintGather, FootprintOptions, GBuffer, SplatStats, splat};
 use caustics_sampling::CounterRng;
@@ -111,6 +111,53 @@ const WALL: [Vec3; 3] = [
     Vec3::new(0.0, 0.0, -4.0),
     Vec3::new(0.0, 2.0, 0.0),
 ];
+
+#[test]
+fn a_pixel_that_a_wall_cuts_has_the_light_that_ends_there() {
+    const STEP: f32 = 0.002;
+    // The seam goes aslant through the picture.
+    let up = Vec3::new(0.3, 1.0, 0.4);
+    let eye = Vec3::new(-2.0, 2.5, 0.5);
+    let camera = Camera::look_at("aslant", eye, [0.4, 0.0, 0.0], up, 0.4).unwrap();
+    let room = Room::new(&[FLOOR, WALL], camera);
+    let places = |low: f32, high: f32| {
+        let count = ((high - low) / STEP).round() as u32;
+        (0..count).map(move |it| low + (it as f32 + 0.5) * STEP)
+    };
+    // From straight above, up to the wall, which catches none.
+    let photons: Vec<Photon> = places(-0.1, 0.5)
+        .flat_map(|x| places(-0.5, 0.5).map(move |z| Vec3::new(x, 0.0, z)))
+        .map(|it| photon(it, Vec3::NEG_Y, STEP, 0))
+        .collect();
+    let (found, _) = room.splatted(&photons);
+    let even = 1.0 / (STEP * STEP);
+    let (mut seams, mut light, mut seen) = (0, 0.0, 0.0);
+    for pixel in 0..SIZE * SIZE {
+        let [column, row] = [pixel % SIZE, pixel / SIZE].map(|it| it as f32);
+        const FINE: u32 = 32;
+        let mut floor = 0.0;
+        let mut is_lit = true;
+        for sample in 0..FINE * FINE {
+            let [x, y] = [sample % FINE, sample / FINE].map(|it| (it as f32 + 0.5) / FINE as f32);
+            let ray = room.camera.ray(column + x, row + y, SIZE, SIZE);
+            let hit = room.rays.closest_hit(&ray).unwrap();
+            let point = room.world.surface(&ray, &hit).unwrap();
+            let place = point.spawn.position;
+            is_lit &= place.z.abs() < 0.4 && place.x > 0.0;
+            floor += if point.object == 0 { 1.0 } else { 0.0 };
+        }
+        let part = floor / (FINE * FINE) as f32;
+        if is_lit && part > 0.0 && part < 1.0 {
+            let own = found[pixel as usize].x / even;
+            assert!((own - part).abs() < 0.1, "{pixel}: {own} of {part}");
+            seams += 1;
+            light += own;
+            seen += part;
+        }
+    }
+    assert!(seams > 10, "{seams}");
+    assert!((light / seen - 1.0).abs() < 0.03, "{light} of {seen}");
+}
 
 #[test]
 fn a_wall_beside_a_lit_floor_catches_what_the_gather_says() {
