@@ -9,7 +9,7 @@ use caustics_trace::{Aim, Branching, EmissionPlan, Fate, TraceOptions};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{PhotonTracer, wgpu};
 
-use common::scenes::{add, add_mesh, ball, floor, glass, lamp, lit};
+use common::scenes::{add, add_mesh, ball, casters, floor, glass, lamp, lit, sky, under};
 use common::tracing::{
     Difference, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
 };
@@ -114,13 +114,50 @@ fn lights_with_an_area() {
         let panel = Light::rectangle([-0.5, 3.0, -0.5], edges, [4.0, 3.0, 2.0]).unwrap();
         let disc = Light::disc([0.3, 3.0, 0.0], [0.1, -1.0, 0.0], 0.4, [4.0; 3]).unwrap();
         let bulb = Light::sphere([0.3, 3.0, 0.2], 0.3, [4.0; 3]).unwrap();
-        for (name, light) in [("panel", panel), ("disc", disc), ("bulb", bulb)] {
+        let corners = [[-0.5, 3.0, -0.5], [0.1, 2.8, 0.9], [0.9, 3.1, -0.2]];
+        // With its front down.
+        let [a, b, c] = corners;
+        let shard = Light::triangle([a, c, b], [4.0, 3.0, 2.0]).unwrap();
+        for (name, light) in [
+            ("panel", panel),
+            ("shard", shard),
+            ("disc", disc),
+            ("bulb", bulb),
+        ] {
             let stage = lit(glass(), light);
             for aim in [Aim::Casters, Aim::Everywhere] {
                 let options = TraceOptions { aim, ..options() };
                 hold(gpu, tracer, &format!("{name} {aim:?}"), &stage, &options);
             }
         }
+    });
+}
+
+#[test]
+fn environments() {
+    with_tracer(|gpu, tracer| {
+        let stage = under(casters(), sky(96, 48));
+        for sequence in Sequence::ALL {
+            for (seed, aim) in [
+                (0, Aim::Casters),
+                (0x1234_5678_9abc_def0, Aim::Casters),
+                (5, Aim::Everywhere),
+            ] {
+                let options = TraceOptions {
+                    sequence,
+                    seed,
+                    aim,
+                    photons: 4 * PHOTONS,
+                    ..options()
+                };
+                let name = format!("sky {sequence} {seed} {aim:?}");
+                hold(gpu, tracer, &name, &stage, &options);
+            }
+        }
+        let mut scene = casters();
+        scene.add_light(lamp()).unwrap();
+        let stage = under(scene, sky(7, 5));
+        hold(gpu, tracer, "sky and lamp", &stage, &options());
     });
 }
 

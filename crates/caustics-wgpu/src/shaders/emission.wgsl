@@ -14,6 +14,9 @@ fn emit(emitter: u32, point: u32) -> Emission {
     if kind == EMITTER_AREA {
         return emit_from_area(emitter, sample);
     }
+    if kind == EMITTER_SKY {
+        return emit_from_sky(emitter, sample);
+    }
     if kind == EMITTER_RECTANGLE {
         return emit_from_rectangle(emitter, sample);
     }
