@@ -257,3 +257,77 @@ pub(crate) fn largest_flux(mirror: &Mirror) -> f32 {
     };
     Vec3::from(mirror.intensity).max_element() * measure * mirror.share
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use caustics_geometry::shapes::icosphere;
+    use caustics_scene::{BvhOptions, Environment, Instance, Material, Scene, Shape};
+    use caustics_trace::EmissionPlan;
+
+    /// The sums of the ledger are integers in units of it.
+    #[test]
+    fn no_photon_exceeds_the_largest_flux() {
+        let corners = [[0.0, 3.0, 0.0], [1.0, 3.0, 0.2], [0.0, 3.0, 1.0]];
+        let edges = [[1.0, 0.0, 0.0], [0.0, 0.2, 1.0]];
+        let color = [4.0, 3.0, 2.0];
+        // The sun's texel is a millionth of the picture and has nearly all of its light; dim texels
+        // have a few parts each, by which their densities are rounded most.
+        let mut pixels = vec![[0.2, 0.3, 0.4]; 64 * 32];
+        pixels[700] = [1e9, 1e8, 1e7];
+        let sky = Environment::new(64, 32, pixels).unwrap();
+        let mut lights = vec![None];
+        lights.extend(
+            [
+                Light::point([0.4, 3.0, 0.2], color),
+                Light::spot([1.0, 3.0, 0.0], [-0.3, -1.0, 0.0], color, 0.1, 0.4),
+                Light::directional([-0.3, -1.0, -0.1], color),
+                Light::rectangle([-0.5, 3.0, -0.5], edges, color),
+                Light::triangle(corners, color),
+                Light::disc([0.3, 3.0, 0.0], [0.1, -1.0, 0.0], 0.4, color),
+                Light::sphere([0.3, 3.0, 0.2], 0.3, color),
+            ]
+            .map(|it| Some(it.unwrap())),
+        );
+        for light in lights {
+            let mut scene = Scene::new();
+            let mesh = Shape::Mesh(scene.add_mesh(icosphere(0.7, 2).unwrap()));
+            let glass = Material::dielectric("glass", 1.5);
+            let glass = scene.add_material(glass).unwrap();
+            let ball = Instance::new("ball", mesh, glass);
+            scene.add_instance(ball).unwrap();
+            match light {
+                Some(light) => {
+                    scene.add_light(light).unwrap();
+                }
+                None => scene.set_environment(Some(sky.clone())),
+            }
+            let world = World::new(&scene).unwrap();
+            let rays = world.intersector(&BvhOptions::default()).unwrap();
+            let options = TraceOptions {
+                photons: 3_000,
+                ..TraceOptions::default()
+            };
+            let plan = EmissionPlan::new(&world, &rays, &options).unwrap();
+            let order = BodyOrder::new(&world).unwrap();
+            let mut photons = 0;
+            for batch in plan.batches() {
+                let emitter = batch.emitter();
+                let mut mirror = mirror(&world, &order, emitter.domain()).unwrap().unwrap();
+                mirror.share = 1.0 / batch.points().count() as f32;
+                let bound = (1.0 + 1e-6) * largest_flux(&mirror);
+                let mut strongest = 0.0f32;
+                for index in 0..batch.count() {
+                    let emission = emitter.emit::<4>(&world, &batch.sample(index));
+                    let flux = emission.map_or(0.0, |it| it.flux.max_element());
+                    strongest = strongest.max(flux);
+                    photons += u32::from(flux > 0.0);
+                }
+                assert!(strongest <= bound, "{strongest} > {bound}: {light:?}");
+                // And the units are not needlessly coarse.
+                assert!(100.0 * strongest > bound, "{strongest} {bound}: {light:?}");
+            }
+            assert!(photons > 100, "{photons}: {light:?}");
+        }
+    }
+}

@@ -130,7 +130,7 @@
 //!
 //! The tracer does not divide photons at the edges of sheets of light
 //! ([`divide_edges`](caustics_trace::TraceOptions::divide_edges) is left aside), numbers at most 2¹⁶ dielectrics, and binds each kind of
-//! data whole: two million triangles in 128 MiB. Where there is no room for all records of a batch,
+//! data whole: two million triangles in 128 MiB, which they share with the environment's texels, 16 bytes each. Where there is no room for all records of a batch,
 //! which of them are lost is another matter in every run; batches that are smaller than all photons
 //! trace a row of the lattice on either side again, for the check of footprints. 28 branches of a photon may wait; beyond 24 it goes
 //! one way at each surface. They take 3 to 5 KB of an invocation's memory. A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one

@@ -138,7 +138,7 @@ fn upload_triangles(
     let what = "triangles with the texels of the environment";
     let count = triangles.len() + sky.rows().len() + sky.texels().len();
     fits(device, what, (count * size_of::<Triangle>()) as u64)?;
-    triangles.extend(sky_tables::packed(sky));
+    triangles.extend(sky_tables::packed_sky(sky));
     upload::<Triangle>(device, what, &triangles, total)
 }
 

@@ -11,7 +11,7 @@ use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
 use crate::scene_hierarchy::margin;
 use crate::shader::{Shader, shader_piece};
-use crate::sky_tables::{packed as packed_sky, same_size, size_of};
+use crate::sky_tables::{packed_sky, same_size, sky_size};
 
 const SHADER: Shader = Shader {
     label: "refit",
@@ -109,7 +109,7 @@ impl SceneRefit {
         }
         let before = scene.environment.as_ref();
         let sky = world.environment();
-        same_size(size_of(sky), size_of(before))?;
+        same_size(sky_size(sky), sky_size(before))?;
         let is_other = |sky: &&Environment| !before.is_some_and(|it| it.shares_picture(sky));
         let tables: Vec<Triangle> = sky
             .filter(is_other)

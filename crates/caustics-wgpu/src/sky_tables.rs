@@ -8,7 +8,7 @@ use crate::gpu_scene::Triangle;
 /// The rows of an environment and its texels, row by row, in the form of the triangles that they lie
 /// behind: three floats in the places of vertices, and in that of the body where the part of the
 /// samples ends. As `shaders/sky_emission.wgsl` says.
-pub(crate) fn packed(sky: &Environment) -> impl Iterator<Item = Triangle> {
+pub(crate) fn packed_sky(sky: &Environment) -> impl Iterator<Item = Triangle> {
     let entry = |[a, b, c]: [f32; 3], end| Triangle {
         a: a.to_bits(),
         b: b.to_bits(),
@@ -38,7 +38,7 @@ pub(crate) fn same_size(given: [u32; 2], expected: [u32; 2]) -> Result<(), GpuEr
 }
 
 /// Width and height; zero where there is no environment.
-pub(crate) fn size_of(sky: Option<&Environment>) -> [u32; 2] {
+pub(crate) fn sky_size(sky: Option<&Environment>) -> [u32; 2] {
     sky.map_or([0; 2], Environment::size)
 }
 
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn rows_come_before_texels() {
         let sky = Environment::new(2, 1, vec![[1.0, 2.0, 3.0], [3.0, 0.0, 0.0]]).unwrap();
-        let entries: Vec<Triangle> = packed(&sky).collect();
+        let entries: Vec<Triangle> = packed_sky(&sky).collect();
         let floats = |it: &Triangle| [it.a, it.b, it.c].map(f32::from_bits);
         assert_eq!(entries.len(), 3);
         let [top, bottom, solid_angle] = floats(&entries[0]);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::GpuError;
 use crate::photon_buffers::PhotonBuffers;
 use crate::scene_buffers::SceneBuffers;
-use crate::sky_tables::{same_size, size_of};
+use crate::sky_tables::{same_size, sky_size};
 use crate::trace_params::{Emitter, MAX_EMITTERS, TraceParams};
 use crate::trace_plan::{PlannedEmitter, TracePlan};
 
@@ -86,7 +86,7 @@ pub(crate) fn params(
         slot.first_of_light -= part.emitters.start as u32;
         if slot.kind == Emitter::SKY {
             let size = [slot.sky_width, slot.sky_height];
-            same_size(size, size_of(scene.environment.as_ref()))?;
+            same_size(size, sky_size(scene.environment.as_ref()))?;
             slot.sky_first = scene.counts.triangles as u32;
         }
     }

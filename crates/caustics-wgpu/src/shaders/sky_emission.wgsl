@@ -1,5 +1,5 @@
 // Photons from an environment. Twins: sky_emission.rs in caustics-trace; environment.rs and
-// environment_parts.rs in caustics-scene, `packed` in sky_tables.rs.
+// environment_parts.rs in caustics-scene, `packed_sky` in sky_tables.rs.
 //
 // Its rows and its texels, row by row, lie behind the scene's triangles in the same buffer, since
 // there is no room for another. The fourth word is where a row's or a texel's part of the samples

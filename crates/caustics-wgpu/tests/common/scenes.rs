@@ -90,12 +90,19 @@ pub(crate) fn casters() -> Scene {
     let gold = Material::metal("gold", [1.0, 0.76, 0.33]);
     let ring = torus(0.8, 0.2, 64, 32).unwrap();
     add_mesh(&mut scene, ring, Vec3::new(1.6, 0.4, 0.3), gold);
-    let flint = Material::dielectric("flint", 1.7)
-        .with_attenuation(Vec3::new(0.2, 1.0, 3.0))
-        .with_dispersion(0.6);
+    // Without absorption, whose last digits are each side's own.
+    let flint = Material::dielectric("flint", 1.7).with_dispersion(0.6);
     let prism = cuboid([0.8, 1.0, 0.6]).unwrap();
     add_mesh(&mut scene, prism, Vec3::new(-1.4, 0.7, -0.2), flint);
     scene
+}
+
+/// The same picture with left and right exchanged.
+pub(crate) fn mirrored(sky: &Environment) -> Environment {
+    let [width, height] = sky.size();
+    let rows = sky.texels().chunks_exact(width as usize);
+    let pixels = rows.flat_map(|row| row.iter().rev().map(|it| it.radiance.to_array()));
+    Environment::new(width, height, pixels.collect()).unwrap()
 }
 
 pub(crate) fn under(mut scene: Scene, sky: Environment) -> Stage {
