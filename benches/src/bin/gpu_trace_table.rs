@@ -33,12 +33,15 @@ struct Row {
     rays: u64,
     parity: Parity,
     replaced: u64,
+    divided: u64,
     dispatches: u32,
     scene_bytes: u64,
     batch_bytes: u64,
     /// Seconds, medians.
     cpu: f64,
     gpu: [f64; 2],
+    /// By the wide hierarchy with no photon divided.
+    whole: f64,
 }
 
 /// How far the two sides are apart.
@@ -98,24 +101,27 @@ fn measured(
         intersector: rays,
         ..
     } = Stage::load(name)?;
-    // The shaders do not divide photons at edges.
     let options = TraceOptions {
-        divide_edges: false,
         photons,
         ..TraceOptions::default()
     };
     let emission = EmissionPlan::new(&world, &rays, &options)?;
     let plan = TracePlan::of(&world, &emission, &options)?;
+    let whole_options = TraceOptions {
+        divide_edges: false,
+        ..options
+    };
+    let whole_plan = TracePlan::of(&world, &emission, &whole_options)?;
     let scene = SceneBuffers::new(&gpu.device, &world)?;
     let capacity = u64::from(photons) * 4;
     let buffers = PhotonBuffers::new(&gpu.device, photons, capacity.min(1_600_000) as u32)?;
 
     let by_cpu = || trace_plan(&world, &rays, &emission, &options, &|_| {});
-    let on_gpu = |tracer: &PhotonTracer| -> Result<u32, Failure> {
+    let on_gpu = |tracer: &PhotonTracer, plan: &TracePlan| -> Result<u32, Failure> {
         let work = gpu.run(|encoder| {
             buffers.clear(encoder);
             let all = 0..plan.photons();
-            Ok(tracer.trace(&gpu.device, encoder, &scene, &plan, all, &buffers)?)
+            Ok(tracer.trace(&gpu.device, encoder, &scene, plan, all, &buffers)?)
         })?;
         Ok(work.dispatches)
     };
@@ -123,25 +129,28 @@ fn measured(
     let mut dispatches = 0;
     let mut parity = Parity::default();
     let mut replaced = 0;
+    let mut divided = 0;
     // The first run also compiles the shader on some adapters.
     for tracer in tracers {
-        dispatches = on_gpu(tracer)?;
+        dispatches = on_gpu(tracer, &plan)?;
         let words = gpu.read(buffers.counters(), 4 * TraceCounters::WORDS as u64)?;
         let counters = TraceCounters::new(&bytemuck::pod_collect_to_vec(&words), &plan)?;
         let bytes = u64::from(counters.stored) * size_of::<FootprintRecord>() as u64;
         let stored: Vec<FootprintRecord> =
             bytemuck::pod_collect_to_vec(&gpu.read(buffers.records(), bytes)?);
         replaced = counters.ledger.replaced_differentials;
+        divided = counters.ledger.divided_photons;
         parity = compared(&world, &expected, &stored).map_err(|it| format!("{name}: {it}"))?;
     }
-    let mut seconds = [const { Vec::new() }; 3];
+    let mut seconds = [const { Vec::new() }; 4];
     for _ in 0..ROUNDS {
         seconds[0].push(timed(|| Ok(by_cpu()?))?);
         for (seconds, tracer) in seconds[1..].iter_mut().zip(tracers) {
-            seconds.push(timed(|| on_gpu(tracer))?);
+            seconds.push(timed(|| on_gpu(tracer, &plan))?);
         }
+        seconds[3].push(timed(|| on_gpu(&tracers[1], &whole_plan))?);
     }
-    let [cpu, binary, wide] = seconds.map(|mut all| {
+    let [cpu, binary, wide, whole] = seconds.map(|mut all| {
         all.sort_by(f64::total_cmp);
         all[all.len() / 2]
     });
@@ -151,11 +160,13 @@ fn measured(
         rays: expected.ledger.rays,
         parity,
         replaced,
+        divided,
         dispatches,
         scene_bytes: scene.bytes(),
         batch_bytes: buffers.bytes(),
         cpu,
         gpu: [binary, wide],
+        whole,
     })
 }
 
@@ -206,20 +217,21 @@ fn compared(
 /// As Markdown.
 fn tables(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| scene | 10⁶ rays | CPU, 10⁶ rays/s | GPU, 10⁶ rays/s | 10³ photons/s | GPU / CPU | wide / binary hierarchy |\n\
-         | --- | --- | --- | --- | --- | --- | --- |\n",
+        "| scene | 10⁶ rays | CPU, 10⁶ rays/s | GPU, 10⁶ rays/s | 10³ photons/s | GPU / CPU | wide / binary hierarchy | divided / whole, time |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for row in rows {
         let rays = row.rays as f64 / 1e6;
         let [binary, wide] = row.gpu;
         text += &format!(
-            "| {} | {rays:.2} | {:.2} | {:.2} | {:.0} | {:.2} | {:.2} |\n",
+            "| {} | {rays:.2} | {:.2} | {:.2} | {:.0} | {:.2} | {:.2} | {:.2} |\n",
             row.name,
             rays / row.cpu,
             rays / wide,
             f64::from(row.photons) / wide / 1e3,
             row.cpu / wide,
             binary / wide,
+            wide / row.whole,
         );
     }
     let mean = |ratio: fn(&Row) -> f64| {
@@ -227,16 +239,17 @@ fn tables(rows: &[Row]) -> String {
         (sum / rows.len().max(1) as f64).exp()
     };
     text += &format!(
-        "| geometric mean | | | | | {:.2} | {:.2} |\n\n",
+        "| geometric mean | | | | | {:.2} | {:.2} | {:.2} |\n\n",
         mean(|row| row.cpu / row.gpu[1]),
         mean(|row| row.gpu[0] / row.gpu[1]),
+        mean(|row| row.gpu[1] / row.whole),
     );
-    text += "| scene | records | equal in every bit | position | flux | axes | from neighbours | dispatches | scene, MB | batch, MB |\n\
-             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+    text += "| scene | records | equal in every bit | position | flux | axes | from neighbours | divided | dispatches | scene, MB | batch, MB |\n\
+             | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
     for row in rows {
         let parity = &row.parity;
         text += &format!(
-            "| {} | {} | {} | {:.0e} | {:.0e} | {:.0e} | {} | {} | {:.1} | {:.1} |\n",
+            "| {} | {} | {} | {:.0e} | {:.0e} | {:.0e} | {} | {} | {} | {:.1} | {:.1} |\n",
             row.name,
             parity.records,
             parity.equal,
@@ -244,15 +257,17 @@ fn tables(rows: &[Row]) -> String {
             parity.flux,
             parity.axes,
             row.replaced,
+            row.divided,
             row.dispatches,
             row.scene_bytes as f64 / 1e6,
             row.batch_bytes as f64 / 1e6,
         );
     }
     text += "\n*wide / binary* is the speed of the wide hierarchy over that of the binary one, in the same\n\
-             run. Parity is between the records of the GPU and the photons of `trace_plan` with the same\n\
-             options, neighbours checked on both sides: the largest distance of landing points relative to\n\
-             the scene, of fluxes, and of footprints' axes relative to the longer one; *from neighbours* are\n\
+             run; *divided / whole* is the time with photons divided at the edges of sheets of light over that\n\
+             without. Parity is between the records of the GPU and the photons of `trace_plan` with the same\n\
+             options, neighbours checked and photons divided on both sides: the largest distance of landing\n\
+             points relative to the scene, of fluxes, and of footprints' axes relative to the longer one; *from neighbours* are\n\
              footprints that the check replaced. *Batch* is all memory that tracing these photons occupies\n\
              besides the scene.\n";
     text

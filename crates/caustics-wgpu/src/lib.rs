@@ -128,15 +128,17 @@
 //!
 //! # Limits
 //!
-//! The tracer does not divide photons at the edges of sheets of light
-//! ([`divide_edges`](caustics_trace::TraceOptions::divide_edges) is left aside), numbers at most 2¹⁶ dielectrics, and binds each kind of
-//! data whole: two million triangles in 128 MiB, which they share with the environment's texels, 16 bytes each. Where there is no room for all records of a batch,
-//! which of them are lost is another matter in every run; batches that are smaller than all photons
-//! trace a row of the lattice on either side again, for the check of footprints. 28 branches of a photon may wait; beyond 24 it goes
-//! one way at each surface. They take 3 to 5 KB of an invocation's memory. A pixel has one receiver: at edges pictures are as jagged as the host's depth. Footprints of one
-//! batch fit one binding, 0.8 million in 128 MiB; more are several batches. A view takes 70 bytes a
-//! pixel, 92 where tiles sum several batches, 76 where quads are blended in 32 bits, and 140 in half floats and four layers, at 1920 by 1080;
-//! and a footprint of the largest batch 272. On a browser's device, errors arrive after the call that caused them, and
+//! The tracer numbers at most 2¹⁶ dielectrics, and binds each kind of data whole: two million triangles
+//! in 128 MiB, which the texels of an environment share, 16 bytes each. Where there is no room for all records of a batch, which of them are lost is another
+//! matter in every run; a photon whose parts have none is [not divided](caustics_trace::TraceOptions::divide_edges)
+//! at the edge of a sheet of light, nor is one whose path met more than 28 surfaces. Batches that are
+//! smaller than all photons trace a row of the lattice on either side again, for the check of
+//! footprints. 28 branches of a photon may wait; beyond 24 it goes one way at each surface. They take 3
+//! to 5 KB of an invocation's memory. A pixel has one receiver: at edges pictures are as jagged as the
+//! host's depth. Footprints of one batch fit one binding, 0.8 million in 128 MiB; more are several
+//! batches. A view takes 70 bytes a pixel, 92 where tiles sum several batches, 76 where quads are
+//! blended in 32 bits, and 140 in half floats and four layers, at 1920 by 1080; and a footprint of the
+//! largest batch 272. On a browser's device, errors arrive after the call that caused them, and
 //! go to the host's handlers.
 //!
 //! What is summed is irradiance: enough for a matt receiver, but not for a glossy one, whose light

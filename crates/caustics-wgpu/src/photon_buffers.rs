@@ -2,6 +2,7 @@ use crate::FootprintRecord;
 use crate::buffers::{fits, storage_buffer};
 use crate::renderer_error::RendererError;
 use crate::trace_counters::TraceCounters;
+use crate::tracer_shaders::LINK_WORDS;
 
 /// Room for photons of other batches that are traced as neighbours of a batch's own: up to a row of
 /// the largest lattice on either side.
@@ -35,11 +36,14 @@ pub(crate) struct TraceScratch {
     pub(crate) counts: wgpu::Buffer,
     /// Photons that have a place in the links.
     pub(crate) slots: u32,
+    /// Where in the links the places of records at edges begin.
+    pub(crate) first_edge: u32,
 }
 
 impl PhotonBuffers {
     /// Room for `capacity` records of a batch of `photons`. A photon that is split at every surface
-    /// stores two to four records in common scenes.
+    /// stores two to four records in common scenes; one that is divided at the edge of a sheet of light
+    /// takes three further places, which are a few hundredths of all.
     ///
     /// # Errors
     /// [`BufferTooLarge`](crate::GpuError::BufferTooLarge), as [`RendererError::Gpu`]: 128 MiB hold
@@ -141,7 +145,9 @@ impl PhotonBuffers {
 impl TraceScratch {
     fn new(device: &wgpu::Device, photons: u32, capacity: u32) -> Result<Self, RendererError> {
         let slots = photons.saturating_add(NEIGHBOURS);
-        let link_bytes = 4 * (u64::from(slots) + 2 * u64::from(capacity));
+        // A record's links, and its place among those at edges.
+        let words = u64::from(LINK_WORDS + 1) * u64::from(capacity);
+        let link_bytes = 4 * (u64::from(slots) + words);
         fits(device, "footprint records", record_bytes(capacity))?;
         fits(device, "links of records", link_bytes)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
@@ -163,6 +169,7 @@ impl TraceScratch {
             ),
             counts: storage_buffer(device, "records of photons", 4 * u64::from(photons), none),
             slots,
+            first_edge: slots + LINK_WORDS * capacity,
         })
     }
 }

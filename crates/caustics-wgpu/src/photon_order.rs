@@ -25,9 +25,11 @@ const ORDER: Shader = Shader {
         shader_piece!("rounding"),
         shader_piece!("grid"),
         shader_piece!("lattice"),
+        shader_piece!("ledger_lines"),
         shader_piece!("ledger"),
         shader_piece!("photon_links"),
         shader_piece!("neighbours"),
+        shader_piece!("photon_beside"),
         shader_piece!("photon_order"),
     ],
 };
@@ -173,6 +175,7 @@ mod tests {
     use crate::shader::{assert_layout, reflection};
     use crate::trace_counters::TraceCounters;
     use crate::trace_params::{MAX_EMITTERS, TraceParams};
+    use crate::tracer_shaders::{LINK_WORDS, PARTS};
 
     #[test]
     fn the_shaders_are_valid_and_agree_with_rust() {
@@ -186,6 +189,8 @@ mod tests {
         assert_eq!(constant("COUNTER_REPLACED"), TraceCounters::REPLACED as u32);
         assert_eq!(constant("MAX_EMITTERS"), MAX_EMITTERS as u32);
         assert_eq!(constant("LINK_PLACE"), !constant("LINK_THINNED"));
+        assert_eq!(constant("LINK_WORDS"), LINK_WORDS);
+        assert_eq!(constant("PARTS"), PARTS);
 
         let (module, _) = reflection::validated(&COUNTS).unwrap_or_else(|it| panic!("{it}"));
         let slots: Vec<(u32, Slot)> = (0..).zip(COUNT_SLOTS).collect();

@@ -9,13 +9,21 @@ use crate::photon_order::{PhotonOrder, dispatch};
 use crate::recorder::{RecordedWork, Recorder};
 use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
-use crate::trace_dispatch::{dispatches_of, params};
+use crate::trace_counters::TraceCounters;
+use crate::trace_dispatch::{Dispatch, dispatches_of, params};
 use crate::trace_params::TraceParams;
 use crate::trace_plan::TracePlan;
-use crate::tracer_shaders::{BINARY, Hierarchy, SLOTS, WIDE, WORKGROUP_SIZE};
+use crate::tracer_shaders::{
+    BINARY, DIVIDERS, EDGE_WORKGROUP_SIZE, Hierarchy, MARK, SLOTS, WIDE, WORKGROUP_SIZE,
+};
+
+/// Photons that one dispatch traces, with the uniform that tells it which, what it binds, and whether
+/// they are the batch's own.
+type Traced = (Dispatch, wgpu::Buffer, wgpu::BindGroup, bool);
 
 /// Traces photons on the GPU: emission, flight and landing in one dispatch, one photon to an
-/// invocation; then their records are put in order, and their footprints checked.
+/// invocation; then those at the edges of sheets of light are divided, all records are put in order, and
+/// their footprints checked.
 ///
 /// It binds eight storage buffers, as many as WebGPU's default limits allow.
 #[derive(Clone, Debug)]
@@ -23,6 +31,8 @@ pub struct PhotonTracer {
     layout: PassLayout,
     /// For rays of 2 and of 4 parameters.
     pipelines: [wgpu::ComputePipeline; 2],
+    mark: wgpu::ComputePipeline,
+    divide: wgpu::ComputePipeline,
     hierarchy: Hierarchy,
     order: PhotonOrder,
 }
@@ -38,12 +48,15 @@ impl PhotonTracer {
     #[must_use]
     pub fn with_hierarchy(device: &wgpu::Device, hierarchy: Hierarchy) -> Self {
         let layout = PassLayout::new(device, "photon tracer", wgpu::ShaderStages::COMPUTE, &SLOTS);
-        let shaders = match hierarchy {
-            Hierarchy::Binary => BINARY,
-            Hierarchy::Wide => WIDE,
+        let [binary, wide] = DIVIDERS;
+        let (shaders, divider) = match hierarchy {
+            Hierarchy::Binary => (BINARY, binary),
+            Hierarchy::Wide => (WIDE, wide),
         };
         Self {
             pipelines: shaders.map(|shader| layout.compute(device, &shader, "trace_photons", &[])),
+            mark: layout.compute(device, &MARK, "mark_edges", &[]),
+            divide: layout.compute(device, &divider, "divide_photons", &[]),
             layout,
             hierarchy,
             order: PhotonOrder::new(device),
@@ -161,6 +174,7 @@ impl PhotonTracer {
             dispatch(&mut pass, part.photons.len() as u32, WORKGROUP_SIZE);
         }
         drop(pass);
+        self.divide(device, recorder, plan, &dispatches, into)?;
         let own = dispatches.iter().filter(|(.., is_own)| *is_own);
         let parts: Vec<_> = own
             .map(|(part, uniform, ..)| (uniform, part.photons.len() as u32))
@@ -168,5 +182,54 @@ impl PhotonTracer {
         let count = photons.len() as u32;
         self.order
             .record(device, recorder, count, &parts, &lists, into)
+    }
+
+    /// Divides those of the batch's own photons that stand at edges of sheets of light, where the plan
+    /// asks for it.
+    fn divide(
+        &self,
+        device: &wgpu::Device,
+        recorder: &mut Recorder<'_>,
+        plan: &TracePlan,
+        dispatches: &[Traced],
+        into: &PhotonBuffers,
+    ) -> Result<(), RendererError> {
+        let divided: Vec<_> = dispatches
+            .iter()
+            .filter(|(part, .., is_own)| *is_own && plan.divides_edges(part.dimensions))
+            .collect();
+        if divided.is_empty() {
+            return Ok(());
+        }
+        let counter = |number: usize| 4 * number as u64;
+        let edges = counter(TraceCounters::EDGES);
+        recorder
+            .encoder
+            .clear_buffer(&into.counters, edges, Some(8));
+        let mut pass = recorder.compute("edges", divided.len() as u32);
+        pass.set_pipeline(&self.mark);
+        for (part, _, group, _) in &divided {
+            pass.set_bind_group(0, group, &[]);
+            dispatch(&mut pass, part.photons.len() as u32, EDGE_WORKGROUP_SIZE);
+        }
+        drop(pass);
+        // As many workgroups as there are edges for.
+        let groups = filled_buffer(
+            device,
+            "workgroups of edges",
+            wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
+            bytemuck::cast_slice(&[0u32, 1, 1]),
+        )?;
+        let found = counter(TraceCounters::EDGE_GROUPS);
+        recorder
+            .encoder
+            .copy_buffer_to_buffer(&into.counters, found, &groups, 0, 4);
+        let mut pass = recorder.compute("division", divided.len() as u32);
+        pass.set_pipeline(&self.divide);
+        for (_, _, group, _) in &divided {
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups_indirect(&groups, 0);
+        }
+        Ok(())
     }
 }

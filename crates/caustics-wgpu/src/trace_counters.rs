@@ -1,6 +1,7 @@
 use caustics_trace::{EnergyLedger, Fate, LedgerEntry};
 use glam::DVec3;
 
+use crate::tracer_shaders::PARTS;
 use crate::{GpuError, TracePlan};
 
 /// What the tracer's counters say, read back.
@@ -18,7 +19,7 @@ pub struct TraceCounters {
 
 impl TraceCounters {
     /// Words of the buffer of counters. Mirrors `COUNTERS` in `shaders/ledger.wgsl`.
-    pub const WORDS: usize = 112;
+    pub const WORDS: usize = 114;
 
     pub(crate) const STORED: usize = 0;
     pub(crate) const LINES: usize = 2;
@@ -26,7 +27,10 @@ impl TraceCounters {
     pub(crate) const FALLBACKS: usize = 18;
     pub(crate) const BOUNDED: usize = 19;
     pub(crate) const REPLACED: usize = 20;
-    pub(crate) const SUMS: usize = 22;
+    pub(crate) const DIVIDED: usize = 21;
+    pub(crate) const EDGES: usize = 22;
+    pub(crate) const EDGE_GROUPS: usize = 23;
+    pub(crate) const SUMS: usize = 24;
 
     /// The fates in the order of the shader's lines, which further ones follow.
     pub(crate) const FATES: [Fate; 10] = [
@@ -83,10 +87,11 @@ impl TraceCounters {
         ledger.emit_unaimed(plan.power() - (emitted.flux - overlap));
         let gain = entry(Self::SILHOUETTE_GAIN).flux - entry(Self::SILHOUETTE_LOSS).flux;
         ledger.edge_gain = gain;
+        ledger.divided_photons = u64::from(words[Self::DIVIDED]);
         ledger.add(
             Fate::Stored,
             &LedgerEntry {
-                count: 0,
+                count: u64::from(PARTS - 1) * ledger.divided_photons,
                 flux: gain,
             },
         );

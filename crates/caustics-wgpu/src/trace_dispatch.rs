@@ -78,6 +78,10 @@ pub(crate) fn params(
         root: scene.root,
         flags: if checks { TraceParams::CHECKS } else { 0 },
         slots: 0,
+        first_edge: into.scratch.first_edge,
+        unused_a: 0,
+        unused_b: 0,
+        unused_c: 0,
         emitters: [Emitter::default(); MAX_EMITTERS],
     };
     let emitters = &plan.emitters[part.emitters.clone()];

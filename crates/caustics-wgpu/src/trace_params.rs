@@ -87,6 +87,10 @@ pub(crate) struct TraceParams {
     pub(crate) root: u32,
     pub(crate) flags: u32,
     pub(crate) slots: u32,
+    pub(crate) first_edge: u32,
+    pub(crate) unused_a: u32,
+    pub(crate) unused_b: u32,
+    pub(crate) unused_c: u32,
     pub(crate) emitters: [Emitter; MAX_EMITTERS],
 }
 

@@ -174,6 +174,13 @@ impl TracePlan {
             && dimensions == 2
     }
 
+    /// Whether photons of rays with so many parameters are divided at the edges of sheets of light.
+    pub(crate) fn divides_edges(&self, dimensions: u32) -> bool {
+        self.options.divide_edges
+            && self.options.branching == Branching::SplitAll
+            && self.checks_footprints(dimensions)
+    }
+
     /// The photons of a batch with those that the check of its footprints asks for: on either side
     /// up to a row of the lattice.
     pub(crate) fn with_neighbours(&self, photons: &Range<u32>) -> Range<u32> {

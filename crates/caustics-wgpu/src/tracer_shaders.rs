@@ -6,6 +6,16 @@ use crate::shader::{FOOTPRINT_RECORD, Shader, shader_piece};
 /// Photons of one workgroup. Mirrors `WORKGROUP_SIZE` in `shaders/tracer.wgsl`.
 pub(crate) const WORKGROUP_SIZE: u32 = 64;
 
+/// Photons or records of one workgroup of [`MARK`] and of [`DIVIDERS`]. Mirrors the constant in
+/// `shaders/edge_rows.wgsl`.
+pub(crate) const EDGE_WORKGROUP_SIZE: u32 = 64;
+
+/// Words that link a record. Mirrors the constant in `shaders/photon_links.wgsl`.
+pub(crate) const LINK_WORDS: u32 = 3;
+
+/// The parts of a divided photon, likewise.
+pub(crate) const PARTS: u32 = 3;
+
 /// Which hierarchy rays traverse. Both give the same hits.
 ///
 /// Chosen by measurement on a software adapter (8 invocations in lockstep), as the speed of tracing
@@ -37,10 +47,10 @@ impl Hierarchy {
     pub const ALL: [Self; 2] = [Self::Binary, Self::Wide];
 }
 
-/// The pieces of a tracer's shader, but for those that say how many parameters a ray has and how its
-/// hits are found.
+/// The pieces of a shader that traces rays: how many parameters a ray has and how its hits are found,
+/// all that takes it from light to receiver, and what is done with it.
 macro_rules! pieces {
-    ($parameters:literal, $nodes:literal, $traverse:literal) => {
+    ($parameters:literal, $nodes:literal, $traverse:literal, $($last:literal),+) => {
         &[
             shader_piece!($parameters),
             FOOTPRINT_RECORD,
@@ -75,11 +85,37 @@ macro_rules! pieces {
             shader_piece!("area_emission"),
             shader_piece!("sky_emission"),
             shader_piece!("overlap"),
-            shader_piece!("ledger"),
+            shader_piece!("ledger_lines"),
             shader_piece!("photon_links"),
+            shader_piece!("photon_turns"),
             shader_piece!("photon_store"),
             shader_piece!("tracer"),
+            $(shader_piece!($last)),+
         ]
+    };
+}
+
+/// Those that trace photons.
+macro_rules! tracer_pieces {
+    ($parameters:literal, $nodes:literal, $traverse:literal) => {
+        pieces!($parameters, $nodes, $traverse, "ledger", "trace_photons")
+    };
+}
+
+/// Those that divide photons at edges.
+macro_rules! divider_pieces {
+    ($nodes:literal, $traverse:literal) => {
+        pieces!(
+            "parameters_2",
+            $nodes,
+            $traverse,
+            "probe_ledger",
+            "probe",
+            "neighbours",
+            "photon_beside",
+            "edge_rows",
+            "divide_photons"
+        )
     };
 }
 
@@ -88,11 +124,11 @@ macro_rules! pieces {
 pub(crate) const BINARY: [Shader; 2] = [
     Shader {
         label: "tracer of 2 parameters, binary",
-        pieces: pieces!("parameters_2", "binary_nodes", "traverse"),
+        pieces: tracer_pieces!("parameters_2", "binary_nodes", "traverse"),
     },
     Shader {
         label: "tracer of 4 parameters, binary",
-        pieces: pieces!("parameters_4", "binary_nodes", "traverse"),
+        pieces: tracer_pieces!("parameters_4", "binary_nodes", "traverse"),
     },
 ];
 
@@ -100,11 +136,44 @@ pub(crate) const BINARY: [Shader; 2] = [
 pub(crate) const WIDE: [Shader; 2] = [
     Shader {
         label: "tracer of 2 parameters",
-        pieces: pieces!("parameters_2", "wide_nodes", "traverse_wide"),
+        pieces: tracer_pieces!("parameters_2", "wide_nodes", "traverse_wide"),
     },
     Shader {
         label: "tracer of 4 parameters",
-        pieces: pieces!("parameters_4", "wide_nodes", "traverse_wide"),
+        pieces: tracer_pieces!("parameters_4", "wide_nodes", "traverse_wide"),
+    },
+];
+
+/// Finds what [`DIVIDERS`] divide. Binds what the tracer binds.
+pub(crate) const MARK: Shader = Shader {
+    label: "mark_edges",
+    pieces: &[
+        FOOTPRINT_RECORD,
+        shader_piece!("trace_params"),
+        shader_piece!("vector"),
+        shader_piece!("rounding"),
+        shader_piece!("grid"),
+        shader_piece!("lattice"),
+        shader_piece!("ledger_lines"),
+        shader_piece!("photon_links"),
+        shader_piece!("photon_turns"),
+        shader_piece!("photon_store"),
+        shader_piece!("neighbours"),
+        shader_piece!("photon_beside"),
+        shader_piece!("edge_rows"),
+        shader_piece!("mark_edges"),
+    ],
+};
+
+/// Divide photons at the edges of sheets of light, by either hierarchy. Bind what the tracer binds.
+pub(crate) const DIVIDERS: [Shader; 2] = [
+    Shader {
+        label: "divide_photons, binary",
+        pieces: divider_pieces!("binary_nodes", "traverse"),
+    },
+    Shader {
+        label: "divide_photons",
+        pieces: divider_pieces!("wide_nodes", "traverse_wide"),
     },
 ];
 
@@ -173,6 +242,30 @@ mod tests {
             );
             assert_eq!(constant("MAP_RESOLUTION"), ProjectionMap::RESOLUTION);
         }
+    }
+
+    #[test]
+    fn shaders_of_edges_are_valid_and_agree_with_rust() {
+        for shader in DIVIDERS {
+            let (module, _) = reflection::validated(&shader).unwrap_or_else(|it| panic!("{it}"));
+            let slots: Vec<(u32, Slot)> = (0..).zip(SLOTS).collect();
+            assert_eq!(reflection::buffers(&module), slots);
+            let size = reflection::workgroup_size(&module, "divide_photons");
+            assert_eq!(size, [EDGE_WORKGROUP_SIZE, 1, 1]);
+            let constant = |name| reflection::constant(&module, name);
+            assert_eq!(constant("LINK_WORDS"), LINK_WORDS);
+            assert_eq!(constant("PARTS"), PARTS);
+            assert_eq!(constant("LINK_PLACE"), !constant("LINK_DIVIDED"));
+            // A path's turns leave the flag of a divided record free.
+            let turns = constant("TURN_FIRST") + constant("TURN_SURFACES");
+            assert_eq!(1 << turns, constant("LINK_DIVIDED"));
+        }
+        let (module, _) = reflection::validated(&MARK).unwrap_or_else(|it| panic!("{it}"));
+        for (place, slot) in reflection::buffers(&module) {
+            assert_eq!(slot, SLOTS[place as usize], "{place}");
+        }
+        let size = reflection::workgroup_size(&module, "mark_edges");
+        assert_eq!(size, [EDGE_WORKGROUP_SIZE, 1, 1]);
     }
 
     #[test]
@@ -289,6 +382,10 @@ mod tests {
                 root,
                 flags,
                 slots,
+                first_edge,
+                unused_a,
+                unused_b,
+                unused_c,
                 emitters,
             }
         );
@@ -304,6 +401,9 @@ mod tests {
             ("COUNTER_FALLBACKS", TraceCounters::FALLBACKS),
             ("COUNTER_BOUNDED", TraceCounters::BOUNDED),
             ("COUNTER_REPLACED", TraceCounters::REPLACED),
+            ("COUNTER_DIVIDED", TraceCounters::DIVIDED),
+            ("COUNTER_EDGES", TraceCounters::EDGES),
+            ("COUNTER_EDGE_GROUPS", TraceCounters::EDGE_GROUPS),
             ("COUNTER_SUMS", TraceCounters::SUMS),
             ("FATE_CROWDED", TraceCounters::CROWDED),
             ("LINE_EMITTED", TraceCounters::EMITTED),

@@ -170,12 +170,7 @@ fn buffers_follow_an_environment_that_changes() {
 fn seen(mut scene: Scene, sky: Environment, options: &TraceOptions) -> stage::Stage {
     scene.set_environment(Some(sky));
     let Stage { world, rays } = Stage::new(World::new(&scene).unwrap());
-    // The shaders do not divide photons at edges.
-    let options = TraceOptions {
-        divide_edges: false,
-        ..*options
-    };
-    let map = trace_photons(&world, &rays, &options, &|_| {}).unwrap();
+    let map = trace_photons(&world, &rays, options, &|_| {}).unwrap();
     let (eye, at) = ([1.0, 4.0, 5.0], [0.2, 0.3, 0.0]);
     stage::Stage {
         photons: map.photons,

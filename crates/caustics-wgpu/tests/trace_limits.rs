@@ -58,9 +58,9 @@ fn batches_have_the_photons_of_one_run() {
         let work = tracer
             .trace(device, &mut encoder, &scene, &plan, batch.clone(), &buffers)
             .unwrap();
-        // Its photons, those beside it, and five for their order.
+        // Its photons, those beside it, two for edges, and five for their order.
         let beside = u32::from(batch.start > 0) + u32::from(batch.end < PHOTONS);
-        assert_eq!((work.passes, work.dispatches), (2, 1 + beside + 5));
+        assert_eq!((work.passes, work.dispatches), (4, 1 + beside + 2 + 5));
         queue.submit([encoder.finish()]);
         photons.extend(records_of(device, queue, &buffers, batch));
     }
@@ -121,12 +121,45 @@ fn what_has_no_room_is_counted() {
     let whole = trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS).counters;
     let crowded = trace_on_gpu(gpu, tracer, &stage, &plan, 100).counters;
     assert_eq!((crowded.stored, whole.crowded.count), (100, 0));
-    assert_eq!(crowded.crowded.count, u64::from(whole.stored) - 100);
+    let landed = u64::from(whole.stored) - 2 * whole.ledger.divided_photons;
+    assert_eq!(crowded.crowded.count, landed - 100);
     let ledger = &crowded.ledger;
     let incoming = ledger.emitted().flux + ledger.roulette_gain() + ledger.edge_gain;
     let missing = incoming - ledger.accounted();
     assert!((missing - crowded.crowded.flux).abs().max_element() < 1e-6);
     assert!(crowded.crowded.flux.min_element() > 0.0);
+}
+
+#[test]
+fn photons_whose_parts_have_no_room_stay_whole() {
+    let Some((gpu, tracer)) = shared_tracer() else {
+        return;
+    };
+    let stage = lit(glass(), lamp());
+    let plan = stage.plan(&options());
+    let whole = trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS);
+    let divided = whole.counters.ledger.divided_photons;
+    let landed = whole.counters.stored - 2 * divided as u32;
+    assert!(divided > 100);
+    for room in [0, 1, 5, 30, 31] {
+        let traced = trace_on_gpu(gpu, tracer, &stage, &plan, landed + room);
+        let TraceCounters {
+            stored,
+            ledger,
+            crowded,
+        } = traced.counters;
+        assert_eq!(crowded.count, 0);
+        // Three places for each of those that are divided.
+        assert_eq!(ledger.divided_photons, u64::from(room / 3));
+        assert_eq!(stored, landed + 2 * (room / 3));
+        assert!(ledger.imbalance() < 1e-6);
+        // All others have one record for each part that landed.
+        let all = traced.photons.iter().zip(&whole.photons);
+        let as_whole = all.clone().filter(|(a, b)| a == b).count();
+        let edges = all.filter(|(a, b)| a.len() != b.len()).count() as u64;
+        assert!(edges <= divided - u64::from(room / 3));
+        assert!(as_whole as u64 >= u64::from(PHOTONS) - edges);
+    }
 }
 
 /// A ball of glass, turned and moved.

@@ -29,7 +29,7 @@ fn the_same_photons_land_in_the_same_places() {
         let difference = Difference::between(&stage.world, &trails, &traced);
         println!(
             "{name}: {} of {PHOTONS} on other paths, {} of {} records equal in every bit, \
-             position {:.0e}, flux {:.0e}, axes {:.0e}, footprints from neighbours {}",
+             position {:.0e}, flux {:.0e}, axes {:.0e}, footprints from neighbours {}, divided {}",
             difference.other_paths(),
             difference.equal_records.0,
             difference.equal_records.1,
@@ -37,6 +37,7 @@ fn the_same_photons_land_in_the_same_places() {
             difference.flux,
             difference.axes,
             traced.counters.ledger.replaced_differentials,
+            traced.counters.ledger.divided_photons,
         );
         for (cause, (count, first)) in difference.first_of_paths() {
             println!("  {cause}: {count}, the first {first:?}");
@@ -53,6 +54,7 @@ fn the_same_photons_land_in_the_same_places() {
         // Lights with an area have no lattice of two parameters.
         let is_checked = name != "p09_cornell.glb";
         assert_eq!(ledger.replaced_differentials > 0, is_checked, "{name}");
+        assert_eq!(ledger.divided_photons > 100, is_checked, "{name}");
         // Of those in whose footprints the blur is as wide as the step, rounding decides.
         assert_eq!(difference.overlaps > 1000, !is_checked, "{name}");
         let others = difference.other_coverages;
@@ -79,6 +81,11 @@ fn other_photons_are_told_apart() {
     let difference = Difference::between(&stage.world, &trails, &traced);
     assert_eq!(difference.beyond_promise(trails.len()).len(), 5);
     // Footprints that are not checked.
+    let options = TraceOptions {
+        divide_edges: false,
+        ..options
+    };
+    let plan = stage.plan(&options);
     let trails = trails_by_cpu(&stage, &options);
     let raw = TraceOptions {
         check_footprints: false,

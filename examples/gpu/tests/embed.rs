@@ -70,10 +70,8 @@ impl Expected {
 #[test]
 fn the_engine_shows_the_caustics_of_the_cpu() -> Result<(), Failure> {
     let scene = builtin::cognac_glass();
-    // The shaders do not divide photons at edges.
     let trace = TraceOptions {
         photons: 30_000,
-        divide_edges: false,
         ..TraceOptions::default()
     };
     let look = Look {

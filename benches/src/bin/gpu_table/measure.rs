@@ -83,9 +83,7 @@ impl Bench {
         let mut rows = Vec::new();
         let mut flip = Flip::new(&stage.reference)?;
         for &photons in counts {
-            // The shaders do not divide photons at edges.
             let options = TraceOptions {
-                divide_edges: false,
                 photons,
                 ..TraceOptions::default()
             };

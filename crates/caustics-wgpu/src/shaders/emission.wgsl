@@ -8,8 +8,7 @@ struct Emission {
     is_valid: bool,
 }
 
-fn emit(emitter: u32, point: u32) -> Emission {
-    let sample = emission_sample(point, emitter);
+fn emit(emitter: u32, sample: EmissionSample) -> Emission {
     let kind = trace.emitters[emitter].kind;
     if kind == EMITTER_AREA {
         return emit_from_area(emitter, sample);

@@ -28,8 +28,9 @@ fn count_photons(
     var count = 0u;
     var place = links[photon];
     while place != 0u {
-        count += 1u;
-        place = links[batch.first_link + 2u * (place - 1u)] & LINK_PLACE;
+        let link = link_of(batch.first_link, place);
+        count += select(1u, PARTS, (links[link + 2u] & LINK_DIVIDED) != 0u);
+        place = links[link] & LINK_PLACE;
     }
     counts[photon] = count;
 }

@@ -11,32 +11,6 @@ const ORDER_WORKGROUP_SIZE: u32 = 64u;
 @group(0) @binding(4) var<storage, read_write> paths: array<u32>;
 @group(0) @binding(6) var<storage, read_write> records: array<FootprintRecord>;
 
-// The first record of a photon that took this path, if there is one.
-fn landed(photon: u32, path: u32, is_along: bool) -> Landed {
-    var found = 0u;
-    if photon != NO_PHOTON {
-        // From the last to the first.
-        var place = links[slot_of(photon)];
-        while place != 0u {
-            let link = trace.first_link + 2u * (place - 1u);
-            found = select(found, place, links[link + 1u] == path);
-            place = links[link] & LINK_PLACE;
-        }
-    }
-    var result: Landed;
-    result.is_there = found != 0u;
-    if result.is_there {
-        result.position = appended[found - 1u].position;
-        if is_along {
-            result.axis = appended[found - 1u].axis_u;
-        } else {
-            result.axis = appended[found - 1u].axis_v;
-        }
-        result.object = appended[found - 1u].object;
-    }
-    return result;
-}
-
 fn book_silhouette(before: vec3<f32>, after: vec3<f32>) {
     if any(after > before) {
         book(LINE_SILHOUETTE_GAIN, after - before);
@@ -58,23 +32,35 @@ fn order_photon(photon: u32) {
     }
     var ordered = starts[slot + 1u];
     while place != 0u {
-        ordered -= 1u;
         var record = appended[place - 1u];
-        let link = trace.first_link + 2u * (place - 1u);
+        let flux = flux_of(record);
+        let link = link_of(trace.first_link, place);
         let before = links[link];
         let path = links[link + 1u];
-        if checks && (before & LINK_THINNED) == 0u {
-            let after = checked(
-                record,
-                array(landed(beside[0].x, path, true), landed(beside[0].y, path, true)),
-                array(landed(beside[1].x, path, false), landed(beside[1].y, path, false)),
-            );
-            count_up(COUNTER_REPLACED, select(0u, 1u, after.is_replaced));
-            book_silhouette(flux_of(record), flux_of(after.record));
-            record = after.record;
+        let parts = links[link + 2u];
+        var flux_after = flux;
+        if (parts & LINK_DIVIDED) != 0u {
+            flux_after = vec3(0.0);
+            for (var part = PARTS; part > 0u; part--) {
+                ordered -= 1u;
+                record = appended[(parts & LINK_PLACE) + part - 2u];
+                flux_after += flux_of(record);
+                records[ordered] = record;
+                paths[ordered] = path;
+            }
+        } else {
+            if checks && (before & LINK_THINNED) == 0u {
+                let landings = landed_beside(beside, path);
+                let after = checked(record, landings[0], landings[1]);
+                count_up(COUNTER_REPLACED, select(0u, 1u, after.is_replaced));
+                record = after.record;
+                flux_after = flux_of(record);
+            }
+            ordered -= 1u;
+            records[ordered] = record;
+            paths[ordered] = path;
         }
-        records[ordered] = record;
-        paths[ordered] = path;
+        book_silhouette(flux, flux_after);
         place = before & LINK_PLACE;
     }
 }

@@ -100,6 +100,11 @@ struct TraceParams {
     flags: u32,
     // Photons that are traced for the batch: its own, and those beside them.
     slots: u32,
+    // Where in `links` the places of records to be divided begin.
+    first_edge: u32,
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
     emitters: array<Emitter, MAX_EMITTERS>,
 }
 

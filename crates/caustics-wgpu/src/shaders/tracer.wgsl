@@ -3,11 +3,6 @@
 // Each place that books is worth its sums on adapters that run all that is in a loop, so there are
 // few of them.
 
-// Branches of one photon that wait. Where no more than a few have room left, photons go one way, as
-// with `BRANCHING_ROULETTE`; what finds no room even so is booked as crowded.
-const MAX_PENDING: u32 = 28u;
-const RESERVED_PENDING: u32 = 4u;
-
 // The longest change of direction that a differential keeps. Twin: `DIRECTION_CHANGE_LIMIT`.
 const DIRECTION_CHANGE_LIMIT: f32 = 0.5;
 
@@ -30,6 +25,8 @@ struct Branch {
     channel: u32,
     // A hash of what the path met and did there.
     path: u32,
+    // Which way it took; see photon_links.wgsl.
+    turns: u32,
     // Whether its footprint was widened for paths that ended where it went on.
     is_thinned: bool,
 }
@@ -68,7 +65,7 @@ fn receive(branch: Branch, point: SurfacePoint) -> u32 {
         side * point.geometric_normal,
         photon_number,
     );
-    let has_room = store_photon(record, branch.path, branch.is_thinned);
+    let has_room = store_photon(record, branch);
     return select(FATE_CROWDED, FATE_STORED, has_room);
 }
 
@@ -85,7 +82,8 @@ fn follow(
     var flux = flux_given;
     var kept = chosen;
     let strongest = largest(flux);
-    if strongest <= 0.0 {
+    let turns = with_turn(branch.turns, branch.depth, outgoing.event == EVENT_REFLECTION);
+    if strongest <= 0.0 || !is_followed(turns, branch.depth) {
         return;
     }
     // What is booked of it here, and whether it ends.
@@ -147,6 +145,7 @@ fn follow(
         branch.has_split,
         branch.channel,
         extended(branch.path, object, 1u + outgoing.event),
+        turns,
         branch.is_thinned || kept < 1.0,
     );
     pending_count += 1u;
@@ -234,7 +233,7 @@ fn advance(branch_given: Branch) {
             branch.channel = channel;
             // Each colour is a sheet of light of its own.
             branch.path = extended(path, channel, 0u);
-            if whole[channel] == 0.0 {
+            if whole[channel] == 0.0 || !is_followed_channel(channel) {
                 continue;
             }
         }
@@ -252,17 +251,15 @@ fn advance(branch_given: Branch) {
     }
 }
 
-fn trace_photon(number: u32) {
-    let emitter = emitter_of(number);
-    photon_number = number;
-    photon_emitter = emitter;
-    last_record = 0u;
+// Sends a photon that is made from point number `point` of its emitter's, at `sample`, and follows all
+// its branches to their ends.
+fn send(emitter: u32, point: u32, sample: EmissionSample) {
     pending_count = 0u;
-    let point = point_number(emitter, number - trace.emitters[emitter].first);
     random_start(point, trace.emitters[emitter].stream);
-    let emission = emit(emitter, point);
+    let emission = emit(emitter, sample);
     if emission.is_valid {
         book(LINE_EMITTED, emission.flux);
+        photon_emitter = emitter;
         photon_covered = is_covered(emitter, emission.ray);
         threshold = trace.min_weight * largest(emission.flux);
         pending[0] = Branch(
@@ -275,6 +272,7 @@ fn trace_photon(number: u32) {
             false,
             ALL_CHANNELS,
             0u,
+            0u,
             false,
         );
         pending_count = 1u;
@@ -283,21 +281,4 @@ fn trace_photon(number: u32) {
         pending_count -= 1u;
         advance(pending[pending_count]);
     }
-    links[slot_of(number)] = last_record;
-}
-
-const WORKGROUP_SIZE: u32 = 64u;
-
-@compute @workgroup_size(WORKGROUP_SIZE)
-fn trace_photons(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) invocation: u32,
-) {
-    let index = (group.y * groups.x + group.x) * WORKGROUP_SIZE + invocation;
-    if index < trace.count {
-        trace_photon(trace.first + index);
-    }
-    workgroupBarrier();
-    publish_ledger(invocation, WORKGROUP_SIZE);
 }

@@ -12,7 +12,7 @@ use caustics_trace::{
     Coverage, EmissionPlan, EnergyLedger, Fate, FootprintSource, LedgerEntry, Photon, PhotonTrail,
     TraceOptions, trace_photon, trace_plan,
 };
-use caustics_wgpu::glam::Vec3;
+use caustics_wgpu::glam::{DVec3, Vec3};
 use caustics_wgpu::{
     FootprintRecord, PhotonBuffers, PhotonTracer, SceneBuffers, TraceCounters, TracePlan, wgpu,
 };
@@ -58,38 +58,47 @@ impl Stage {
 }
 
 /// The trails of all photons by the CPU, in the order of their numbers, with their footprints as
-/// [`trace_plan`] leaves them: checked against the neighbours', where the options ask for it.
+/// [`trace_plan`] leaves them: checked against the neighbours' and divided at edges, where the options
+/// ask for it.
 pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<PhotonTrail> {
     let Stage { world, rays } = stage;
-    // The shaders do not divide photons at edges.
-    let options = &TraceOptions {
-        divide_edges: false,
-        ..*options
-    };
     let plan = EmissionPlan::new(world, rays, options).unwrap();
     let trail = |photon| trace_photon(world, rays, &plan, options, photon).unwrap();
     let mut trails: Vec<_> = (0..plan.count()).map(trail).collect();
     let map = trace_plan(world, rays, &plan, options, &|_| {}).unwrap();
     let mut checked = map.photons.into_iter();
     for trail in &mut trails {
-        for photon in &mut trail.photons {
-            let checked = checked.next().unwrap();
-            assert_eq!(photon.incoming, checked.incoming);
-            let gain = checked.flux.as_dvec3() - photon.flux.as_dvec3();
-            trail.ledger.edge_gain += gain;
+        let landed = std::mem::take(&mut trail.photons);
+        let paths = std::mem::take(&mut trail.paths);
+        for (photon, path) in landed.into_iter().zip(paths) {
+            let first = checked.next().unwrap();
+            let is_divided = first.source == FootprintSource::Divided;
+            assert!(is_divided || photon.incoming == first.incoming);
+            let mut parts = vec![first];
+            if is_divided {
+                parts.extend(checked.by_ref().take(2));
+            }
+            let after: DVec3 = parts.iter().map(|it| it.flux.as_dvec3()).sum();
+            let gain = after - photon.flux.as_dvec3();
+            let ledger = &mut trail.ledger;
+            ledger.edge_gain += gain;
+            ledger.divided_photons += u64::from(is_divided);
+            let is_replaced = first.source == FootprintSource::Neighbour;
+            ledger.replaced_differentials += u64::from(is_replaced);
             let stored = LedgerEntry {
-                count: 0,
+                count: parts.len() as u64 - 1,
                 flux: gain,
             };
-            trail.ledger.add(Fate::Stored, &stored);
-            *photon = checked;
-            let is_replaced = photon.source == FootprintSource::Neighbour;
-            trail.ledger.replaced_differentials += u64::from(is_replaced);
+            ledger.add(Fate::Stored, &stored);
+            trail.paths.extend(parts.iter().map(|_| path));
+            trail.photons.extend(parts);
         }
     }
     assert_eq!(checked.next(), None);
-    let replaced = trails.iter().map(|it| it.ledger.replaced_differentials);
-    assert_eq!(replaced.sum::<u64>(), map.ledger.replaced_differentials);
+    let sum = |of: fn(&EnergyLedger) -> u64| trails.iter().map(|it| of(&it.ledger)).sum::<u64>();
+    let replaced = sum(|it| it.replaced_differentials);
+    assert_eq!(replaced, map.ledger.replaced_differentials);
+    assert_eq!(sum(|it| it.divided_photons), map.ledger.divided_photons);
     trails
 }
 
@@ -332,6 +341,7 @@ pub(crate) fn unlike_lines(a: &EnergyLedger, b: &EnergyLedger, photons: usize) -
             a.replaced_differentials,
             b.replaced_differentials,
         ),
+        ("divided", a.divided_photons, b.divided_photons),
         ("bounded", a.bounded_differentials, b.bounded_differentials),
         ("fallbacks", a.normal_fallbacks, b.normal_fallbacks),
     ];

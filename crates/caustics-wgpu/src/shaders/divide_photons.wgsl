@@ -1,0 +1,253 @@
+// The last photons of a lattice's rows, divided. Twin: edges.rs in caustics-trace, which says why.
+
+// How often the stretch in which a row's end lies is halved.
+const HALVINGS: u32 = 3u;
+const LAST_WIDTH: f32 = 0.0625;
+
+// Where in a row's last cell each part begins and ends, from the inside to the edge.
+const STRATA: array<vec2<f32>, PARTS> = array(vec2(0.0, 0.5), vec2(0.5, 0.75), vec2(0.75, 1.0));
+
+// A row, and how far it goes from its last point, in cells.
+struct Row {
+    axis: u32,
+    // Whether it ends towards larger or smaller coordinates.
+    side: f32,
+    reach: f32,
+    inner: Landed,
+}
+
+// A part of the light of a row's last photon.
+struct Stratum {
+    position: vec3<f32>,
+    // Along the row, as if for a whole cell.
+    axis: vec3<f32>,
+    object: u32,
+    // Its middle, in cells from the point towards the edge.
+    middle: f32,
+}
+
+// What is `along` cells from the point towards the row's end, and `across` cells beside the row.
+fn row_offset(row: Row, along: f32, across: f32) -> vec2<f32> {
+    let ahead = row.side * along;
+    return select(vec2(across, ahead), vec2(ahead, across), row.axis == 0u);
+}
+
+fn axis_of(record: FootprintRecord, axis: u32) -> vec3<f32> {
+    return select(record.axis_v, record.axis_u, axis == 0u);
+}
+
+fn step_in_plane(photon: FootprintRecord, position: vec3<f32>) -> vec3<f32> {
+    let displacement = position - photon.position;
+    return displacement - photon.normal * dot(displacement, photon.normal);
+}
+
+// How many times as long as its axis a photon's neighbours let its footprint be, at most once.
+fn checked_ratio(photon: FootprintRecord, axis: vec3<f32>, pair: array<Landed, 2>) -> f32 {
+    var farthest = -1.0;
+    for (var i = 0u; i < 2u; i++) {
+        if pair[i].is_there && pair[i].object == photon.object {
+            farthest = max(farthest, length_of(step_in_plane(photon, pair[i].position)));
+        }
+    }
+    let length = length_of(axis);
+    return select(1.0, farthest / length, farthest >= 0.0 && length > LIMIT * farthest);
+}
+
+// A part as a photon: `own` by those before and after it.
+fn part_of(
+    photon: FootprintRecord,
+    row: Row,
+    narrowing: f32,
+    slant: f32,
+    width: f32,
+    own: Stratum,
+    before: Stratum,
+    after: Stratum,
+    has_after: bool,
+) -> FootprintRecord {
+    var part = photon;
+    part.flux_r *= width;
+    part.flux_g *= width;
+    part.flux_b *= width;
+    // For one cell towards the edge.
+    var unit = row.side * own.axis;
+    var fit = vec2(0.0, 1.0);
+    let has_before = before.object == own.object;
+    let goes_on = has_after && after.object == own.object;
+    if has_before || goes_on {
+        let to_before = step_in_plane(photon, before.position) / (before.middle - own.middle);
+        let to_after = step_in_plane(photon, after.position) / (after.middle - own.middle);
+        // Of equal distances the latter.
+        let is_before_farther = dot(to_before, to_before) > dot(to_after, to_after);
+        let takes_before = has_before && (!goes_on || is_before_farther);
+        let step = select(to_after, to_before, takes_before);
+        let length = length_of(unit);
+        let distance = length_of(step);
+        var ratio = MAX_RATIO;
+        if distance > 0.0 {
+            ratio = min(length / distance, MAX_RATIO);
+        }
+        let is_fitted = !has_after && ratio > LEAST_SILHOUETTE;
+        if is_fitted {
+            fit = silhouette_fit(ratio, 1.0 / (4.0 * ratio * (ratio - 1.0)));
+        } else if !has_after {
+            fit = vec2(EDGE_SHIFT, EDGE_EXTENT);
+        }
+        unit = select(unit, step, is_fitted || ratio > LIMIT);
+    }
+    part.position = part.position - fit.x * width * unit;
+    let ahead = row.side * fit.y * width * unit;
+    let along = row.side * slant * unit;
+    if row.axis == 0u {
+        part.axis_u = ahead;
+        part.axis_v = narrowing * part.axis_v + along;
+    } else {
+        part.axis_v = ahead;
+        part.axis_u = narrowing * part.axis_u + along;
+    }
+    return part;
+}
+
+fn is_finite_record(record: FootprintRecord) -> bool {
+    return all_finite(record.position) && all_finite(record.axis_u) && all_finite(record.axis_v);
+}
+
+fn divide_record(place: u32) {
+    let photon = appended[place - 1u];
+    // Another dispatch is told of its emitter.
+    if photon.photon < trace.first || photon.photon - trace.first >= trace.count {
+        return;
+    }
+    let link = link_of(trace.first_link, place);
+    sought_path = links[link + 1u];
+    sought_turns = links[link + 2u];
+    photon_number = photon.photon;
+    let emitter = emitter_of(photon.photon);
+    let point = point_number(emitter, photon.photon - trace.emitters[emitter].first);
+    let landings = landed_beside(neighbours_of(emitter, photon.photon), sought_path);
+
+    var rows: array<Row, 2>;
+    var ends = 0u;
+    for (var axis = 0u; axis < 2u; axis++) {
+        if is_end(photon, landings[axis]) {
+            let side = select(-1.0, 1.0, landings[axis][0].is_there);
+            rows[ends] = Row(axis, side, 0.0, inner_of(landings[axis]));
+            ends += 1u;
+        }
+    }
+    // The ends of all rows; how far the row goes half a row on; the parts.
+    let searches = HALVINGS * ends;
+    let slanted = searches + HALVINGS;
+    var row = rows[0];
+    var reach_beside = 0.0;
+    var width = 0.5;
+    var parts: array<FootprintRecord, PARTS>;
+    var strata: array<Stratum, PARTS>;
+    var parts_found = 0u;
+    for (var step = 0u; step < slanted + PARTS; step++) {
+        if step < slanted && step % HALVINGS == 0u {
+            width = 0.5;
+            if step < searches {
+                row = rows[step / HALVINGS];
+            }
+        }
+        if step == searches {
+            row = rows[0];
+            // The axis that crosses the edge the more steeply.
+            if ends == 2u && rows[1].reach < rows[0].reach {
+                row = rows[1];
+            }
+            reach_beside = row.reach - 0.5;
+        }
+        var along = 0.0;
+        var across = 0.0;
+        let part = step - slanted;
+        if step < searches {
+            along = row.reach + width;
+        } else if step < slanted {
+            along = reach_beside + width;
+            across = 0.5;
+        } else {
+            along = 0.5 * (STRATA[part].x + STRATA[part].y) * (0.5 + row.reach) - 0.5;
+        }
+        probe(emitter, point, row_offset(row, along, across));
+        if step < slanted {
+            let gain = select(0.0, width, is_probed);
+            width *= 0.5;
+            let is_last = step % HALVINGS == HALVINGS - 1u;
+            let more = gain + select(0.0, width, is_last);
+            if step < searches {
+                row.reach += more;
+                rows[step / HALVINGS] = row;
+            } else {
+                reach_beside += more;
+            }
+        } else if is_probed {
+            parts[part] = probed;
+            strata[part] = Stratum(
+                probed.position, axis_of(probed, row.axis), probed.object, along);
+            parts_found += 1u;
+        }
+    }
+    if parts_found < PARTS {
+        return;
+    }
+    let slant = 2.0 * row.side * (reach_beside - row.reach);
+    let cells = 0.5 + row.reach;
+    // Along the edge the photon's neighbours may have landed nearer than its differential says.
+    var narrowing = 1.0;
+    if ends == 1u {
+        let beside = 1u - row.axis;
+        narrowing = checked_ratio(photon, axis_of(photon, beside), landings[beside]);
+    }
+    var before = Stratum(row.inner.position, row.inner.axis, row.inner.object, -1.0);
+    var is_sound = true;
+    for (var part = 0u; part < PARTS; part++) {
+        let stratum = STRATA[part];
+        let has_after = part + 1u < PARTS;
+        parts[part] = part_of(
+            parts[part],
+            row,
+            narrowing,
+            0.5 * (stratum.x + stratum.y) * slant,
+            (stratum.y - stratum.x) * cells,
+            strata[part],
+            before,
+            strata[min(part + 1u, PARTS - 1u)],
+            has_after,
+        );
+        before = strata[part];
+        is_sound = is_sound && is_finite_record(parts[part]);
+    }
+    if !is_sound {
+        return;
+    }
+    let first = atomicAdd(&counters[COUNTER_STORED], PARTS);
+    if first + PARTS > arrayLength(&appended) {
+        // It stays whole.
+        atomicSub(&counters[COUNTER_STORED], PARTS);
+        return;
+    }
+    for (var part = 0u; part < PARTS; part++) {
+        appended[first + part] = parts[part];
+    }
+    links[link + 2u] = LINK_DIVIDED | (first + 1u);
+    atomicAdd(&group_divided, 1u);
+}
+
+@compute @workgroup_size(EDGE_WORKGROUP_SIZE)
+fn divide_photons(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    let edges = atomicLoad(&counters[COUNTER_EDGES]);
+    let stride = EDGE_WORKGROUP_SIZE * groups.x;
+    for (var index = group.x * EDGE_WORKGROUP_SIZE + invocation; index < edges; index += stride) {
+        divide_record(links[trace.first_edge + index]);
+    }
+    workgroupBarrier();
+    if invocation == 0u {
+        publish_probes();
+    }
+}
