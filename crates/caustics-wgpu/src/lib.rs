@@ -93,7 +93,8 @@
 //!
 //! One invocation follows one photon and all its branches, from the point of its lattice to its
 //! landings: the same light, hits, events and random numbers as
-//! [`trace_photons`](caustics_trace::trace_photons) has for the same number. Its operations stand in
+//! [`trace_photons`](caustics_trace::trace_photons) has for the same number, from every kind of light.
+//! Its operations stand in
 //! the order of their CPU twins, so that an adapter that rounds each of them, as software ones do,
 //! gives the same bits: on the ten scenes of the tests all 10⁵ photons each, with their footprints.
 //! Only absorption and the places on exact spheres that shine differ, in the last digits. Adapters
