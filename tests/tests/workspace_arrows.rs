@@ -12,7 +12,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
     ("caustics-sampling", &[]),
     ("caustics-filter", &[]),
     ("caustics-accel", &["geometry"]),
-    ("caustics-scene", &["accel", "geometry"]),
+    ("caustics-scene", &["sampling", "accel", "geometry"]),
     (
         "caustics-trace",
         &["sampling", "scene", "accel", "geometry"],

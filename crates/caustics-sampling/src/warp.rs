@@ -20,6 +20,7 @@ pub use cone::{Cone, ConeError};
 pub use cosine_hemisphere::{cosine_hemisphere_to_square, square_to_cosine_hemisphere};
 pub use disc_concentric::{disc_concentric_to_square, square_to_disc_concentric};
 pub use disc_polar::{disc_polar_to_square, square_to_disc_polar};
+pub use sine_cosine::sine_cosine;
 pub use sphere_octahedral::{sphere_octahedral_to_square, square_to_sphere_octahedral};
 pub use sphere_polar::{sphere_polar_to_square, square_to_sphere_polar};
 pub use triangle::{barycentric_to_square, square_to_barycentric, square_to_triangle};

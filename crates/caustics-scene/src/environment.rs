@@ -1,14 +1,18 @@
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use caustics_sampling::warp::sine_cosine;
+use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
+
+use crate::environment_parts::{EnvironmentRow, EnvironmentTexel, PARTS, chosen, ends};
 
 /// Light from all around, infinitely far away: an equirectangular picture of radiance.
 ///
 /// The upper row is the sky overhead (+Y), the middle of the picture is -Z and columns go on to +X,
 /// so that a camera without rotation looks at the middle. Each texel has one radiance throughout.
 /// Directions are sampled in proportion to the strongest channel, texel by texel, and evenly within
-/// each.
+/// each. Clones share the picture.
 ///
 /// ```
 /// use caustics_scene::Environment;
@@ -25,12 +29,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     width: u32,
-    height: u32,
-    pixels: Vec<Vec3>,
-    /// The part of all weight up to and including each row; the last is 1.
-    rows: Vec<f64>,
-    /// For each row, the part of its weight up to and including each texel.
-    columns: Vec<f64>,
+    rows: Arc<[EnvironmentRow]>,
+    texels: Arc<[EnvironmentTexel]>,
+    strongest: f32,
 }
 
 /// A direction from which light comes.
@@ -45,10 +46,16 @@ pub struct EnvironmentSample {
 }
 
 impl Environment {
+    /// The most texels along either side.
+    pub const MAX_SIDE: u32 = 1 << 16;
+
+    /// Of how many parts samples are shared among rows, and those of a row among its texels.
+    pub const PARTS: u32 = PARTS;
+
     /// The light of a picture, row by row from the top, in W/(sr m^2).
     ///
     /// # Errors
-    /// Its size is zero or not that of the pixels, a radiance is negative or not finite, or all is
+    /// Its size is zero, not that of the pixels or beyond [`MAX_SIDE`](Self::MAX_SIDE), a radiance is negative or not finite, or all is
     /// black.
     pub fn new(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Result<Self, EnvironmentError> {
         if u64::from(width) * u64::from(height) != pixels.len() as u64 || pixels.is_empty() {
@@ -56,6 +63,13 @@ impl Environment {
                 width,
                 height,
                 pixels: pixels.len(),
+            });
+        }
+        if width.max(height) > Self::MAX_SIDE {
+            return Err(EnvironmentError::Side {
+                width,
+                height,
+                limit: Self::MAX_SIDE,
             });
         }
         let bad = |value: &f32| !(value.is_finite() && *value >= 0.0);
@@ -68,59 +82,93 @@ impl Environment {
         }
         let pixels: Vec<Vec3> = pixels.into_iter().map(Vec3::from).collect();
         let mut rows = Vec::with_capacity(height as usize);
-        let mut columns = Vec::with_capacity(pixels.len());
-        let mut total = 0.0;
-        for (row, texels) in pixels.chunks_exact(width as usize).enumerate() {
-            let (top, bottom) = heights(row as u32, height);
-            let area = f64::from(top - bottom);
-            let mut sum = 0.0;
-            let first = columns.len();
-            for texel in texels {
-                sum += f64::from(texel.max_element());
-                columns.push(sum);
-            }
-            if sum > 0.0 {
-                for value in &mut columns[first..] {
-                    *value /= sum;
-                }
-            }
-            total += sum * area;
-            rows.push(total);
+        let mut texels = Vec::with_capacity(pixels.len());
+        let mut row_weights = Vec::with_capacity(height as usize);
+        let mut weights = Vec::with_capacity(width as usize);
+        for (row, of_row) in (0..height).zip(pixels.chunks_exact(width as usize)) {
+            weights.clear();
+            weights.extend(of_row.iter().map(|it| f64::from(it.max_element())));
+            let texel = |(&radiance, end)| EnvironmentTexel { radiance, end };
+            texels.extend(of_row.iter().zip(ends(&weights)).map(texel));
+            let (top, bottom) = (edge(row, height), edge(row + 1, height));
+            rows.push(EnvironmentRow {
+                top,
+                bottom,
+                solid_angle: TAU / width as f32 * (top - bottom),
+                end: 0,
+            });
+            row_weights.push(weights.iter().sum::<f64>() * f64::from(top - bottom));
         }
+        let total: f64 = row_weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
             return Err(EnvironmentError::Black);
         }
-        for value in &mut rows {
-            *value /= total;
+        for (row, end) in rows.iter_mut().zip(ends(&row_weights)) {
+            row.end = end;
         }
-        Ok(Self {
+        let mut sky = Self {
             width,
-            height,
-            pixels,
-            rows,
-            columns,
-        })
+            rows: rows.into(),
+            texels: texels.into(),
+            strongest: 0.0,
+        };
+        sky.strongest = sky.strongest();
+        Ok(sky)
+    }
+
+    /// Its width and height in texels.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.rows.len() as u32]
+    }
+
+    /// Its rows, from the top.
+    #[must_use]
+    pub fn rows(&self) -> &[EnvironmentRow] {
+        &self.rows
+    }
+
+    /// Its texels, row by row from the top.
+    #[must_use]
+    pub fn texels(&self) -> &[EnvironmentTexel] {
+        &self.texels
+    }
+
+    /// Whether both are clones of one: then they have the same picture, and none need be compared.
+    #[must_use]
+    pub fn shares_picture(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.texels, &other.texels)
+    }
+
+    /// What the radiance of no [`sample`](Self::sample), divided by its density, exceeds in any
+    /// channel, in W/m^2. Importance makes it nearly the same for all.
+    #[must_use]
+    pub fn strongest_sample(&self) -> f32 {
+        self.strongest
     }
 
     /// Radiance of the light that comes from a unit direction, in W/(sr m^2).
     #[must_use]
     pub fn radiance(&self, towards: Vec3) -> Vec3 {
+        let [width, height] = self.size();
         // Casts saturate, and a NaN is 0.
-        let row = (towards.y.clamp(-1.0, 1.0).acos() / PI * self.height as f32) as u32;
+        let row = (towards.y.clamp(-1.0, 1.0).acos() / PI * height as f32) as u32;
         let turn = towards.x.atan2(-towards.z) / TAU + 0.5;
-        let column = (turn * self.width as f32) as u32;
-        self.texel(column.min(self.width - 1), row.min(self.height - 1))
+        let column = (turn * width as f32) as u32;
+        let of_row = self.texels_of(row.min(height - 1) as usize);
+        of_row[column.min(width - 1) as usize].radiance
     }
 
     /// The radiance of all directions together, integrated over the sphere, in W/m^2: times the
     /// cross-section of a ball, the flux that falls on it.
     #[must_use]
     pub fn total(&self) -> Vec3 {
-        let mut sum = glam::DVec3::ZERO;
-        for (row, texels) in self.pixels.chunks_exact(self.width as usize).enumerate() {
-            let all: glam::DVec3 = texels.iter().map(|it| it.as_dvec3()).sum();
-            sum += f64::from(self.solid_angle(row as u32)) * all;
-        }
+        let of_row = |(index, row): (usize, &EnvironmentRow)| {
+            let texels = self.texels_of(index).iter();
+            let all: DVec3 = texels.map(|it| it.radiance.as_dvec3()).sum();
+            f64::from(row.solid_angle) * all
+        };
+        let sum: DVec3 = self.rows.iter().enumerate().map(of_row).sum();
         sum.as_vec3()
     }
 
@@ -128,56 +176,54 @@ impl Environment {
     /// of the square.
     #[must_use]
     pub fn sample(&self, sample: Vec2) -> EnvironmentSample {
-        let (row, down, row_part) = chosen(&self.rows, sample.y);
-        let first = row as usize * self.width as usize;
-        let of_row = &self.columns[first..first + self.width as usize];
-        let (column, along, column_part) = chosen(of_row, sample.x);
-        let (top, bottom) = heights(row, self.height);
-        let height = top + (bottom - top) * down;
+        let row = chosen(&self.rows, sample.y);
+        let EnvironmentRow {
+            top,
+            bottom,
+            solid_angle,
+            ..
+        } = self.rows[row.index];
+        let of_row = self.texels_of(row.index);
+        let column = chosen(of_row, sample.x);
+        let height = top + (bottom - top) * row.along;
         let ring = (1.0 - height * height).max(0.0).sqrt();
-        let turn = TAU * ((column as f32 + along) / self.width as f32 - 0.5);
+        let turn = (column.index as f32 + column.along) / self.width as f32 - 0.5;
+        let (sine, cosine) = sine_cosine(TAU * turn);
         EnvironmentSample {
-            towards: Vec3::new(ring * turn.sin(), height, -ring * turn.cos()),
-            radiance: self.texel(column, row),
-            pdf: row_part * column_part / self.solid_angle(row),
+            towards: Vec3::new(ring * sine, height, -ring * cosine),
+            radiance: of_row[column.index].radiance,
+            pdf: row.part * column.part / solid_angle,
         }
     }
 
-    fn texel(&self, column: u32, row: u32) -> Vec3 {
-        self.pixels[row as usize * self.width as usize + column as usize]
+    fn texels_of(&self, row: usize) -> &[EnvironmentTexel] {
+        let width = self.width as usize;
+        &self.texels[row * width..(row + 1) * width]
     }
 
-    /// Of one texel of a row, in steradians.
-    fn solid_angle(&self, row: u32) -> f32 {
-        let (top, bottom) = heights(row, self.height);
-        TAU / self.width as f32 * (top - bottom)
+    fn strongest(&self) -> f32 {
+        let mut strongest = 0.0f32;
+        let mut row_start = 0;
+        for (index, row) in self.rows.iter().enumerate() {
+            let row_part = (row.end - row_start) as f32 / PARTS as f32;
+            row_start = row.end;
+            let mut start = 0;
+            for texel in self.texels_of(index) {
+                let part = (texel.end - start) as f32 / PARTS as f32;
+                start = texel.end;
+                let pdf = row_part * part / row.solid_angle;
+                if pdf > 0.0 {
+                    strongest = strongest.max(texel.radiance.max_element() / pdf);
+                }
+            }
+        }
+        strongest
     }
 }
 
-/// The cosines of the angles from +Y at which a row begins and ends.
-fn heights(row: u32, height: u32) -> (f32, f32) {
-    let cosine = |row: u32| (PI * row as f32 / height as f32).cos();
-    (cosine(row), cosine(row + 1))
-}
-
-/// The entry of a cumulative distribution at a number in [0, 1), how far along it, and its part.
-fn chosen(cumulative: &[f64], number: f32) -> (u32, f32, f32) {
-    let number = f64::from(number.max(0.0).min(1.0f32.next_down()));
-    let index = cumulative
-        .partition_point(|&end| end <= number)
-        .min(cumulative.len() - 1);
-    let start = index.checked_sub(1).map_or(0.0, |it| cumulative[it]);
-    let part = cumulative[index] - start;
-    let along = if part > 0.0 {
-        ((number - start) / part) as f32
-    } else {
-        0.5
-    };
-    (
-        index as u32,
-        along.clamp(0.0, 1.0f32.next_down()),
-        part as f32,
-    )
+/// The cosine of the angle from +Y at which a row begins.
+fn edge(row: u32, height: u32) -> f32 {
+    (PI * row as f32 / height as f32).cos()
 }
 
 /// A picture that gives no light.
@@ -193,6 +239,16 @@ pub enum EnvironmentError {
         height: u32,
         /// Pixels given.
         pixels: usize,
+    },
+    /// More texels along a side than can be told apart.
+    #[error("an environment of {width} by {height} pixels has more than {limit} along a side")]
+    Side {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// The most along either.
+        limit: u32,
     },
     /// A radiance that is negative or not finite.
     #[error("radiance {value} of pixel {pixel} is not a finite number of at least 0")]
@@ -250,6 +306,49 @@ mod tests {
         );
     }
 
+    /// Nearly all samples carry the mean; the bound holds for the last bit of each.
+    #[test]
+    fn no_sample_is_stronger_than_the_strongest() {
+        let sky = sky();
+        let mut strongest = 0.0f32;
+        for index in 0u16..50_000 {
+            let at = Vec2::new(f32::from(index % 250), f32::from(index / 250));
+            let sample = sky.sample((at + 0.5) / Vec2::new(250.0, 200.0));
+            strongest = strongest.max(sample.radiance.max_element() / sample.pdf);
+        }
+        assert!(strongest <= sky.strongest_sample());
+        assert!(strongest > 0.999 * sky.strongest_sample());
+    }
+
+    #[test]
+    fn clones_share_their_picture() {
+        let (one, other) = (sky(), sky());
+        assert!(one == other && !one.shares_picture(&other));
+        assert!(one.shares_picture(&one.clone()));
+        assert_eq!(one.size(), [16, 8]);
+    }
+
+    /// Beside a sun of 10^30 times their radiance.
+    #[test]
+    fn the_dimmest_texels_are_sampled_too() {
+        let (width, height) = (64, 32);
+        let mut pixels = vec![[1.0; 3]; 64 * 32];
+        pixels[700] = [1e30; 3];
+        pixels[701] = [0.0; 3];
+        let sky = Environment::new(width, height, pixels).unwrap();
+        assert_eq!(sky.rows()[31].end, PARTS);
+        for row in 0..32 {
+            let start = if row == 0 { 0 } else { sky.rows()[row - 1].end };
+            assert!(sky.rows()[row].end > start, "{row}");
+            let of_row = sky.texels_of(row);
+            assert_eq!(of_row[63].end, PARTS);
+            let starts = std::iter::once(0).chain(of_row.iter().map(|it| it.end));
+            for (texel, start) in of_row.iter().zip(starts) {
+                assert_eq!(texel.end > start, texel.radiance != Vec3::ZERO, "{row}");
+            }
+        }
+    }
+
     #[test]
     fn the_middle_is_ahead_and_columns_go_to_the_right() {
         let pixels = (0u8..8).map(|index| [f32::from(index) + 1.0; 3]).collect();
@@ -281,5 +380,15 @@ mod tests {
             }
         );
         assert!(Environment::new(1, 1, vec![[f32::NAN; 3]]).is_err());
+        let long = vec![[1.0; 3]; 65_537];
+        assert_eq!(
+            refused(65_537, 1, &long),
+            EnvironmentError::Side {
+                width: 65_537,
+                height: 1,
+                limit: 65_536
+            }
+        );
+        assert!(Environment::new(65_536, 1, long[1..].to_vec()).is_ok());
     }
 }

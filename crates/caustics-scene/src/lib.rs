@@ -41,7 +41,7 @@
 //! | [`Material`], [`Surface`] | how surfaces scatter, absorb and emit light |
 //! | [`Brdf`] | how receivers reflect: Lambertian, or glTF's metallic-roughness model |
 //! | [`Light`], [`LightPoint`] | point, spot and directional lights; rectangles, triangles, discs and balls that shine |
-//! | [`Environment`] | light from all around |
+//! | [`Environment`], [`EnvironmentRow`], [`EnvironmentTexel`] | light from all around, and how it is sampled |
 //! | [`Camera`], [`Projection`] | pixels to rays and back |
 //! | [`Scene`], [`Instance`], [`Shape`] | what is where |
 //! | [`World`], [`Object`] | the scene flattened |
@@ -78,6 +78,7 @@ mod brdf;
 pub mod builtin;
 mod camera;
 mod environment;
+mod environment_parts;
 #[cfg(feature = "gltf")]
 pub mod gltf;
 mod instanced;
@@ -96,6 +97,7 @@ pub use brdf::Brdf;
 pub use camera::{Camera, CameraError, Projection};
 pub use caustics_accel::{AccelError, BvhOptions, Intersect};
 pub use environment::{Environment, EnvironmentError, EnvironmentSample};
+pub use environment_parts::{EnvironmentRow, EnvironmentTexel};
 pub use instanced::InstancedIntersector;
 pub use intersector::SceneIntersector;
 pub use light::Light;

@@ -56,7 +56,8 @@ pub enum EmissionDomain {
         target: Option<Sphere>,
     },
     /// Rays from the world's environment: directions by
-    /// [`Environment::sample`](caustics_scene::Environment::sample), places on the disc across them
+    /// [`Environment::sample`](caustics_scene::Environment::sample), of whose tables a shader can make
+    /// the same, places on the disc across them
     /// by [`square_to_disc_concentric`](caustics_sampling::warp::square_to_disc_concentric) in a
     /// [`Frame::from_normal`] of the direction towards the light.
     Sky {

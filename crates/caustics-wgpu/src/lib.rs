@@ -93,7 +93,8 @@
 //!
 //! One invocation follows one photon and all its branches, from the point of its lattice to its
 //! landings: the same light, hits, events and random numbers as
-//! [`trace_photons`](caustics_trace::trace_photons) has for the same number. Its operations stand in
+//! [`trace_photons`](caustics_trace::trace_photons) has for the same number, from every kind of light.
+//! Its operations stand in
 //! the order of their CPU twins, so that an adapter that rounds each of them, as software ones do,
 //! gives the same bits: on the ten scenes of the tests all 10⁵ photons each, with their footprints.
 //! Only absorption and the places on exact spheres that shine differ, in the last digits. Adapters
@@ -129,7 +130,7 @@
 //! # Limits
 //!
 //! The tracer numbers at most 2¹⁶ dielectrics, and binds each kind of data whole: two million triangles
-//! in 128 MiB. Where there is no room for all records of a batch, which of them are lost is another
+//! in 128 MiB, which the texels of an environment share, 16 bytes each. Where there is no room for all records of a batch, which of them are lost is another
 //! matter in every run; a photon whose parts have none is [not divided](caustics_trace::TraceOptions::divide_edges)
 //! at the edge of a sheet of light, nor is one whose path met more than 28 surfaces. Batches that are
 //! smaller than all photons trace a row of the lattice on either side again, for the check of
@@ -158,6 +159,7 @@ mod buffers;
 mod camera_matrix;
 mod capabilities;
 mod composite;
+mod emitter_mirror;
 mod error;
 mod error_scope;
 mod footprint_record;
@@ -178,6 +180,7 @@ mod scene_buffers;
 mod scene_hierarchy;
 mod scene_refit;
 mod shader;
+mod sky_tables;
 mod splat;
 mod splat_options;
 mod splat_quads;

@@ -71,7 +71,8 @@ impl PhotonTracer {
     /// beside the range are traced again with it, so that batches have the footprints of one run.
     ///
     /// # Errors
-    /// [`GpuError::PhotonRange`], as [`RendererError::Gpu`]; [`RendererError::DeviceLost`].
+    /// [`GpuError::PhotonRange`], [`GpuError::SceneChanged`] where the plan is of another environment,
+    /// as [`RendererError::Gpu`]; [`RendererError::DeviceLost`].
     pub fn trace(
         &self,
         device: &wgpu::Device,
@@ -135,7 +136,7 @@ impl PhotonTracer {
         let mut dispatches = Vec::new();
         for (number, range) in ranges.iter().enumerate() {
             for part in dispatches_of(&plan.emitters, range) {
-                let mut params = params(scene, plan, &part, into);
+                let mut params = params(scene, plan, &part, into)?;
                 params.batch_first = photons.start;
                 params.slots = slots;
                 if number > 0 {

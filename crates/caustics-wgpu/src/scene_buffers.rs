@@ -1,19 +1,21 @@
 use std::ops::Range;
 
 use bytemuck::Pod;
-use caustics_scene::World;
+use caustics_scene::{Environment, World};
 
 use crate::body_order::BodyOrder;
 use crate::buffers::{filled_buffer, fits};
 use crate::gpu_scene::{Body, Node, PackedScene, Triangle, Vertex, WideNode};
 use crate::renderer_error::RendererError;
 use crate::scene_hierarchy::SceneHierarchy;
+use crate::sky_tables;
 
 /// A [`World`] where the shaders can trace it: vertices, triangles, objects with their materials,
-/// and a hierarchy of boxes over all of it.
+/// a hierarchy of boxes over all of it, and the environment.
 ///
 /// Each kind is one buffer that is bound whole. Within WebGPU's default limits of 128 MiB a binding
-/// that is room for two million triangles; more is refused.
+/// that is room for two million triangles; more is refused. An environment shares the buffer of
+/// triangles, 16 bytes a texel: two million triangles leave room for 3072 by 1536 texels.
 #[derive(Clone, Debug)]
 pub struct SceneBuffers {
     pub(crate) nodes: wgpu::Buffer,
@@ -22,6 +24,7 @@ pub struct SceneBuffers {
     pub(crate) wide_sources: wgpu::Buffer,
     pub(crate) wide_count: u32,
     pub(crate) vertices: wgpu::Buffer,
+    /// With the environment's rows and texels behind them.
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) bodies: wgpu::Buffer,
     pub(crate) root: u32,
@@ -31,6 +34,8 @@ pub struct SceneBuffers {
     /// By how much each leaf's box is wider than what it holds, in metres.
     pub(crate) margin: f32,
     pub(crate) counts: SceneCounts,
+    /// What the tables behind the triangles were made from.
+    pub(crate) environment: Option<Environment>,
     /// Whether any receiver is glossy.
     pub(crate) is_glossy: bool,
     bytes: u64,
@@ -62,7 +67,7 @@ impl SceneBuffers {
         let what = "children of wide nodes";
         let wide_sources = upload::<[u32; 4]>(device, what, &wide.sources, &mut bytes)?;
         let vertices = upload::<Vertex>(device, "vertices", &packed.vertices, &mut bytes)?;
-        let triangles = upload::<Triangle>(device, "triangles", &packed.triangles, &mut bytes)?;
+        let triangles = upload_triangles(device, packed.triangles, world, &mut bytes)?;
         let bodies = upload::<Body>(device, "bodies", &packed.bodies, &mut bytes)?;
         let (order, rows) = hierarchy.refit_order();
         let refit_order = upload::<u32>(device, "refit order", &order, &mut bytes)?;
@@ -80,9 +85,10 @@ impl SceneBuffers {
             margin: hierarchy.margin,
             counts: SceneCounts {
                 vertices: packed.vertices.len(),
-                triangles: packed.triangles.len(),
+                triangles: world.triangles().len(),
                 bodies: packed.bodies.len(),
             },
+            environment: world.environment().cloned(),
             is_glossy: is_glossy(world),
             bytes,
         })
@@ -117,6 +123,23 @@ fn is_glossy(world: &World) -> bool {
         let surface = &world.materials()[object.material as usize].surface;
         surface.brdf().is_some_and(|brdf| !brdf.is_lambertian())
     })
+}
+
+/// The triangles, and behind them the world's environment.
+fn upload_triangles(
+    device: &wgpu::Device,
+    mut triangles: Vec<Triangle>,
+    world: &World,
+    total: &mut u64,
+) -> Result<wgpu::Buffer, RendererError> {
+    let Some(sky) = world.environment() else {
+        return upload::<Triangle>(device, "triangles", &triangles, total);
+    };
+    let what = "triangles with the texels of the environment";
+    let count = triangles.len() + sky.rows().len() + sky.texels().len();
+    fits(device, what, (count * size_of::<Triangle>()) as u64)?;
+    triangles.extend(sky_tables::packed_sky(sky));
+    upload::<Triangle>(device, what, &triangles, total)
 }
 
 /// A storage buffer of these elements, or of one that is never read where there are none.

@@ -1,9 +1,9 @@
 use bytemuck::{Pod, Zeroable};
-use caustics_scene::World;
+use caustics_scene::{Environment, World};
 
 use crate::GpuError;
 use crate::buffers::filled_buffer;
-use crate::gpu_scene::PackedScene;
+use crate::gpu_scene::{PackedScene, Triangle};
 use crate::pass_layout::{PassLayout, Slot};
 use crate::photon_order::dispatch;
 use crate::recorder::{RecordedWork, Recorder};
@@ -11,6 +11,7 @@ use crate::renderer_error::RendererError;
 use crate::scene_buffers::SceneBuffers;
 use crate::scene_hierarchy::margin;
 use crate::shader::{Shader, shader_piece};
+use crate::sky_tables::{packed_sky, same_size, sky_size};
 
 const SHADER: Shader = Shader {
     label: "refit",
@@ -77,8 +78,9 @@ impl SceneRefit {
         }
     }
 
-    /// Records the upload of a world's vertices, objects and materials, and fits the hierarchy to
-    /// them. The world must have the primitives that the buffers were made for, in the same order.
+    /// Records the upload of a world's vertices, objects and materials, and of its environment where
+    /// that is another, and fits the hierarchy to them. The world must have the primitives that the
+    /// buffers were made for, in the same order, and an environment of the same size.
     ///
     /// # Errors
     /// [`GpuError::SceneChanged`], as [`RendererError::Gpu`]; [`RendererError::DeviceLost`].
@@ -105,18 +107,35 @@ impl SceneRefit {
                 }));
             }
         }
-        let parts: [(&wgpu::Buffer, &[u8]); 3] = [
-            (&scene.vertices, bytemuck::cast_slice(&packed.vertices)),
-            (&scene.triangles, bytemuck::cast_slice(&packed.triangles)),
-            (&scene.bodies, bytemuck::cast_slice(&packed.bodies)),
+        let before = scene.environment.as_ref();
+        let sky = world.environment();
+        same_size(sky_size(sky), sky_size(before))?;
+        let is_other = |sky: &&Environment| !before.is_some_and(|it| it.shares_picture(sky));
+        let tables: Vec<Triangle> = sky
+            .filter(is_other)
+            .into_iter()
+            .flat_map(packed_sky)
+            .collect();
+        let triangles: &[u8] = bytemuck::cast_slice(&packed.triangles);
+        let parts: [(&wgpu::Buffer, usize, &[u8]); 4] = [
+            (&scene.vertices, 0, bytemuck::cast_slice(&packed.vertices)),
+            (&scene.triangles, 0, triangles),
+            (
+                &scene.triangles,
+                triangles.len(),
+                bytemuck::cast_slice(&tables),
+            ),
+            (&scene.bodies, 0, bytemuck::cast_slice(&packed.bodies)),
         ];
-        for (buffer, bytes) in parts {
+        for (buffer, first, bytes) in parts {
             if !bytes.is_empty() {
                 let usage = wgpu::BufferUsages::COPY_SRC;
                 let staging = filled_buffer(device, "scene update", usage, bytes)?;
-                encoder.copy_buffer_to_buffer(&staging, 0, buffer, 0, bytes.len() as u64);
+                let size = bytes.len() as u64;
+                encoder.copy_buffer_to_buffer(&staging, 0, buffer, first as u64, size);
             }
         }
+        scene.environment = sky.cloned();
         scene.margin = margin(&world.bounds());
         self.fit(device, encoder, scene)
     }

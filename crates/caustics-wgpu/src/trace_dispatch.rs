@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use crate::GpuError;
 use crate::photon_buffers::PhotonBuffers;
 use crate::scene_buffers::SceneBuffers;
+use crate::sky_tables::{same_size, sky_size};
 use crate::trace_params::{Emitter, MAX_EMITTERS, TraceParams};
 use crate::trace_plan::{PlannedEmitter, TracePlan};
 
@@ -50,13 +52,14 @@ pub(crate) fn dispatches_of(emitters: &[PlannedEmitter], photons: &Range<u32>) -
     all
 }
 
-/// What a dispatch is told, but for what it has in common with the others of its batch.
+/// What a dispatch is told, but for what it has in common with the others of its batch. A plan whose
+/// environment is of another size than the scene's is refused.
 pub(crate) fn params(
     scene: &SceneBuffers,
     plan: &TracePlan,
     part: &Dispatch,
     into: &PhotonBuffers,
-) -> TraceParams {
+) -> Result<TraceParams, GpuError> {
     let checks = plan.checks_footprints(part.dimensions);
     let mut params = TraceParams {
         zero: 0,
@@ -85,8 +88,13 @@ pub(crate) fn params(
     for (slot, emitter) in params.emitters.iter_mut().zip(emitters) {
         *slot = emitter.mirror;
         slot.first_of_light -= part.emitters.start as u32;
+        if slot.kind == Emitter::SKY {
+            let size = [slot.sky_width, slot.sky_height];
+            same_size(size, sky_size(scene.environment.as_ref()))?;
+            slot.sky_first = scene.counts.triangles as u32;
+        }
     }
-    params
+    Ok(params)
 }
 
 #[cfg(test)]

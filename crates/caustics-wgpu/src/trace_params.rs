@@ -47,9 +47,9 @@ pub(crate) struct Emitter {
     pub(crate) first_map: u32,
     pub(crate) surface: u32,
     pub(crate) radius: f32,
-    pub(crate) unused_a: u32,
-    pub(crate) unused_b: u32,
-    pub(crate) unused_c: u32,
+    pub(crate) sky_first: u32,
+    pub(crate) sky_width: u32,
+    pub(crate) sky_height: u32,
 }
 
 impl Emitter {
@@ -57,11 +57,13 @@ impl Emitter {
     pub(crate) const CONE: u32 = 1;
     pub(crate) const RECTANGLE: u32 = 2;
     pub(crate) const AREA: u32 = 3;
+    pub(crate) const SKY: u32 = 4;
 
     pub(crate) const SURFACE_OBJECT: u32 = 0;
     pub(crate) const SURFACE_RECTANGLE: u32 = 1;
     pub(crate) const SURFACE_DISC: u32 = 2;
     pub(crate) const SURFACE_CAP: u32 = 3;
+    pub(crate) const SURFACE_TRIANGLE: u32 = 4;
 
     pub(crate) const NO_MAP: u32 = u32::MAX;
 }

@@ -1,21 +1,17 @@
 use std::collections::HashMap;
-use std::f32::consts::PI;
 use std::ops::Range;
 
 use caustics_accel::Intersect;
-use caustics_geometry::Frame;
-use caustics_sampling::warp::Cone;
-use caustics_sampling::{CounterRng, Grid, Rank1Lattice, Rotation, Sequence};
-use caustics_scene::{Light, World};
+use caustics_sampling::Sequence;
+use caustics_scene::World;
 use caustics_trace::{
-    AreaSurface, Branching, Culling, EmissionBatch, EmissionDomain, EmissionPlan, MediumStack,
-    TraceOptions,
+    AreaSurface, Branching, Culling, EmissionBatch, EmissionDomain, EmissionPlan, TraceOptions,
 };
-use glam::{DVec3, Vec2, Vec3};
+use glam::DVec3;
 
 use crate::GpuError;
 use crate::body_order::{BodyOrder, at_most};
-use crate::gpu_scene::SPHERE_BIT;
+use crate::emitter_mirror::{largest_flux, mirror, sample_from, set_media};
 use crate::trace_params::{Emitter as Mirror, MAX_EMITTERS, NO_CASTER};
 
 /// The largest flux of a photon, in units of the ledger's sums.
@@ -51,9 +47,8 @@ impl TracePlan {
     /// and follows the few photons by which the others are shared.
     ///
     /// # Errors
-    /// [`GpuError::Options`] for options out of range, [`GpuError::Unsupported`] for
-    /// [`Culling`] and light from an [`Environment`](caustics_scene::Environment), and
-    /// [`GpuError::TooMany`].
+    /// [`GpuError::Options`] for options out of range, [`GpuError::Unsupported`] for [`Culling`],
+    /// and [`GpuError::TooMany`].
     pub fn new<I: Intersect + ?Sized>(
         world: &World,
         intersect: &I,
@@ -239,228 +234,4 @@ fn unsupported(options: &TraceOptions) -> Option<&'static str> {
     } else {
         None
     }
-}
-
-/// What the shader is told of an emitter's rays; `None` where it has none.
-fn mirror(
-    world: &World,
-    order: &BodyOrder,
-    domain: &EmissionDomain,
-) -> Result<Option<Mirror>, GpuError> {
-    let everywhere = Mirror {
-        // Cones wider than all directions, inside which the light does not fall off.
-        inner_cosine: -2.0,
-        outer_cosine: -3.0,
-        target_radius: -1.0,
-        side: 1.0,
-        ..Mirror::default()
-    };
-    let mirror = match domain {
-        EmissionDomain::Sphere { light, origin } => Mirror {
-            kind: Mirror::SPHERE,
-            origin: origin.to_array(),
-            solid_angle: 4.0 * PI,
-            ..with_light(everywhere, light)
-        },
-        EmissionDomain::Cone {
-            light,
-            origin,
-            frame,
-            cone,
-        } => Mirror {
-            kind: Mirror::CONE,
-            origin: origin.to_array(),
-            ..in_frame(with_light(everywhere, light), frame, Some(cone))
-        },
-        EmissionDomain::Rectangle {
-            corner,
-            edges: [along, across],
-            direction,
-            irradiance,
-        } => Mirror {
-            kind: Mirror::RECTANGLE,
-            origin: corner.to_array(),
-            tangent: along.to_array(),
-            bitangent: across.to_array(),
-            axis: direction.to_array(),
-            intensity: irradiance.to_array(),
-            area: along.length() * across.length(),
-            ..everywhere
-        },
-        EmissionDomain::Area { surface, target } => {
-            let (center, radius) = target.map_or((Vec3::ZERO, -1.0), |it| (it.center, it.radius));
-            Mirror {
-                kind: Mirror::AREA,
-                intensity: surface.radiance(world).to_array(),
-                area: surface.area(world),
-                target_center: center.to_array(),
-                target_radius: radius,
-                ..from_surface(everywhere, world, order, surface)?
-            }
-        }
-        EmissionDomain::Nothing => return Ok(None),
-        EmissionDomain::Sky { .. } => {
-            return Err(GpuError::Unsupported {
-                what: "light from an environment",
-            });
-        }
-        _ => {
-            return Err(GpuError::Unsupported {
-                what: "a kind of light",
-            });
-        }
-    };
-    Ok(Some(mirror))
-}
-
-fn with_light(mirror: Mirror, light: &Light) -> Mirror {
-    match *light {
-        Light::Point { intensity, .. } => Mirror {
-            intensity: intensity.to_array(),
-            ..mirror
-        },
-        Light::Spot {
-            direction,
-            intensity,
-            inner_cos,
-            outer_cos,
-            ..
-        } => Mirror {
-            intensity: intensity.to_array(),
-            spot_axis: direction.to_array(),
-            inner_cosine: inner_cos,
-            outer_cosine: outer_cos,
-            ..mirror
-        },
-        _ => mirror,
-    }
-}
-
-fn in_frame(mirror: Mirror, frame: &Frame, cone: Option<&Cone>) -> Mirror {
-    Mirror {
-        tangent: frame.tangent.to_array(),
-        bitangent: frame.bitangent.to_array(),
-        axis: frame.normal.to_array(),
-        height: cone.map_or(0.0, |it| it.height()),
-        solid_angle: cone.map_or(0.0, |it| it.solid_angle()),
-        ..mirror
-    }
-}
-
-fn from_surface(
-    mirror: Mirror,
-    world: &World,
-    order: &BodyOrder,
-    surface: &AreaSurface,
-) -> Result<Mirror, GpuError> {
-    Ok(match surface {
-        AreaSurface::Rectangle {
-            corner,
-            edges: [along, across],
-            normal,
-            ..
-        } => Mirror {
-            surface: Mirror::SURFACE_RECTANGLE,
-            origin: corner.to_array(),
-            tangent: along.to_array(),
-            bitangent: across.to_array(),
-            axis: normal.to_array(),
-            ..mirror
-        },
-        AreaSurface::Disc {
-            center,
-            frame,
-            radius,
-            ..
-        } => Mirror {
-            surface: Mirror::SURFACE_DISC,
-            origin: center.to_array(),
-            radius: *radius,
-            ..in_frame(mirror, frame, None)
-        },
-        AreaSurface::Cap {
-            center,
-            radius,
-            frame,
-            cone,
-            ..
-        } => Mirror {
-            surface: Mirror::SURFACE_CAP,
-            origin: center.to_array(),
-            radius: *radius,
-            ..in_frame(mirror, frame, Some(cone))
-        },
-        AreaSurface::Object { emitter, front } => {
-            let light = &world.emitters()[*emitter as usize];
-            let primitives = light.primitives();
-            let first_primitive = if world.sphere(primitives.start).is_some() {
-                SPHERE_BIT | order.bodies[light.object() as usize]
-            } else {
-                primitives.start
-            };
-            Mirror {
-                surface: Mirror::SURFACE_OBJECT,
-                side: if *front { 1.0 } else { -1.0 },
-                first_primitive,
-                primitive_count: primitives.len() as u32,
-                ..mirror
-            }
-        }
-        AreaSurface::Triangle { .. } => {
-            return Err(GpuError::Unsupported {
-                what: "a triangle that shines",
-            });
-        }
-        _ => {
-            return Err(GpuError::Unsupported {
-                what: "a kind of surface that shines",
-            });
-        }
-    })
-}
-
-/// Sets what chooses the samples; its `points` are set.
-fn sample_from(mirror: &mut Mirror, options: &TraceOptions) {
-    let rotation = if options.seed == 0 {
-        Rotation::NONE
-    } else {
-        Rotation::new(options.seed)
-    };
-    let mut place = rotation.shift();
-    match options.sequence {
-        Sequence::Grid => {
-            mirror.rows = Grid::new(mirror.points).rows();
-            place = if options.seed == 0 {
-                Vec2::splat(0.5)
-            } else {
-                CounterRng::new(options.seed, 0).next_vec2()
-            };
-        }
-        Sequence::Fibonacci => {
-            let lattice = Rank1Lattice::fibonacci(mirror.points);
-            mirror.generator = lattice.generator();
-            let [first, second] = lattice.basis();
-            mirror.basis = [first.x, first.y, second.x, second.y];
-        }
-        _ => {}
-    }
-    mirror.place = place.to_array();
-}
-
-fn set_media(mirror: &mut Mirror, media: &MediumStack, order: &BodyOrder) {
-    for (place, &object) in media.objects().iter().enumerate() {
-        mirror.media[place / 2] |= order.bodies[object as usize] << (16 * (place % 2));
-        mirror.media_count += 1;
-    }
-}
-
-/// What no photon of the emitter exceeds in any channel, in watts.
-fn largest_flux(mirror: &Mirror) -> f32 {
-    let measure = match mirror.kind {
-        Mirror::RECTANGLE => mirror.area,
-        // The widest cone, and more than the cosine-weighted hemisphere.
-        Mirror::AREA => 2.0 * PI * mirror.area,
-        _ => mirror.solid_angle,
-    };
-    Vec3::from(mirror.intensity).max_element() * measure * mirror.share
 }

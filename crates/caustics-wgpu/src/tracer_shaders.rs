@@ -83,6 +83,7 @@ macro_rules! pieces {
             shader_piece!("differential"),
             shader_piece!("emission"),
             shader_piece!("area_emission"),
+            shader_piece!("sky_emission"),
             shader_piece!("overlap"),
             shader_piece!("ledger_lines"),
             shader_piece!("photon_links"),
@@ -118,8 +119,8 @@ macro_rules! divider_pieces {
     };
 }
 
-/// For lights without area, whose rays have two parameters, and for area lights, whose rays have
-/// four.
+/// For lights without area, whose rays have two parameters, and for area lights and skies, whose rays
+/// have four.
 pub(crate) const BINARY: [Shader; 2] = [
     Shader {
         label: "tracer of 2 parameters, binary",
@@ -199,6 +200,7 @@ mod tests {
     use crate::scene_hierarchy::MAX_WAITING;
     use crate::shader::{ShaderPiece, assert_layout, reflection};
     use crate::trace_params::{Emitter, MAX_EMITTERS, NO_CASTER, TraceParams};
+    use caustics_scene::Environment;
     use caustics_trace::ProjectionMap;
 
     #[test]
@@ -225,10 +227,13 @@ mod tests {
             assert_eq!(constant("EMITTER_CONE"), Emitter::CONE);
             assert_eq!(constant("EMITTER_RECTANGLE"), Emitter::RECTANGLE);
             assert_eq!(constant("EMITTER_AREA"), Emitter::AREA);
+            assert_eq!(constant("EMITTER_SKY"), Emitter::SKY);
+            assert_eq!(constant("SKY_PARTS"), Environment::PARTS);
             assert_eq!(constant("SURFACE_OBJECT"), Emitter::SURFACE_OBJECT);
             assert_eq!(constant("SURFACE_RECTANGLE"), Emitter::SURFACE_RECTANGLE);
             assert_eq!(constant("SURFACE_DISC"), Emitter::SURFACE_DISC);
             assert_eq!(constant("SURFACE_CAP"), Emitter::SURFACE_CAP);
+            assert_eq!(constant("SURFACE_TRIANGLE"), Emitter::SURFACE_TRIANGLE);
             assert_eq!(constant("NO_CASTER"), NO_CASTER);
             assert_eq!(constant("NO_MAP"), Emitter::NO_MAP);
             assert_eq!(
@@ -353,9 +358,9 @@ mod tests {
                 first_map,
                 surface,
                 radius,
-                unused_a,
-                unused_b,
-                unused_c,
+                sky_first,
+                sky_width,
+                sky_height,
             }
         );
         assert_layout!(

@@ -9,7 +9,7 @@ use caustics_trace::{Aim, Branching, EmissionPlan, Fate, TraceOptions};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{PhotonTracer, wgpu};
 
-use common::scenes::{add, add_mesh, ball, floor, glass, lamp, lit};
+use common::scenes::{add, add_mesh, ball, casters, floor, glass, lamp, lit, sky, under};
 use common::tracing::{
     Difference, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
 };
@@ -26,7 +26,13 @@ fn options() -> TraceOptions {
 }
 
 /// Traces on both sides, and holds the GPU to its promise.
-fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &TraceOptions) {
+fn hold(
+    gpu: &Gpu,
+    tracer: &PhotonTracer,
+    name: &str,
+    stage: &Stage,
+    options: &TraceOptions,
+) -> Difference {
     let plan = stage.plan(options);
     let traced = trace_on_gpu(gpu, tracer, stage, &plan, 8 * options.photons);
     let trails = trails_by_cpu(stage, options);
@@ -38,6 +44,16 @@ fn hold(gpu: &Gpu, tracer: &PhotonTracer, name: &str, stage: &Stage, options: &T
     beyond.extend(unlike_lines(&traced.counters.ledger, &ledger, trails.len()));
     assert_eq!(beyond, Vec::<String>::new(), "{name}");
     assert!(difference.equal_records.1 > 40, "{name}");
+    difference
+}
+
+/// Where an adapter rounds every operation, as software ones do, all bits are the CPU's.
+fn hold_bits(gpu: &Gpu, difference: &Difference, name: &str) {
+    if gpu.0.adapter_info().device_type == wgpu::DeviceType::Cpu {
+        assert_eq!(difference.other_paths(), 0, "{name}");
+        let (equal, all) = difference.equal_records;
+        assert_eq!(equal, all, "{name}");
+    }
 }
 
 fn with_tracer(test: impl Fn(&Gpu, &PhotonTracer)) {
@@ -114,13 +130,63 @@ fn lights_with_an_area() {
         let panel = Light::rectangle([-0.5, 3.0, -0.5], edges, [4.0, 3.0, 2.0]).unwrap();
         let disc = Light::disc([0.3, 3.0, 0.0], [0.1, -1.0, 0.0], 0.4, [4.0; 3]).unwrap();
         let bulb = Light::sphere([0.3, 3.0, 0.2], 0.3, [4.0; 3]).unwrap();
-        for (name, light) in [("panel", panel), ("disc", disc), ("bulb", bulb)] {
+        let corners = [[-0.5, 3.0, -0.5], [0.1, 2.8, 0.9], [0.9, 3.1, -0.2]];
+        // With its front down.
+        let [a, b, c] = corners;
+        let shard = Light::triangle([a, c, b], [4.0, 3.0, 2.0]).unwrap();
+        for (name, light) in [
+            ("panel", panel),
+            ("shard", shard),
+            ("disc", disc),
+            ("bulb", bulb),
+        ] {
             let stage = lit(glass(), light);
             for aim in [Aim::Casters, Aim::Everywhere] {
                 let options = TraceOptions { aim, ..options() };
                 hold(gpu, tracer, &format!("{name} {aim:?}"), &stage, &options);
             }
         }
+    });
+}
+
+#[test]
+fn environments() {
+    with_tracer(|gpu, tracer| {
+        let stage = under(casters(), sky(96, 48));
+        let many = TraceOptions {
+            photons: 4 * PHOTONS,
+            ..options()
+        };
+        let trails = trails_by_cpu(&stage, &many);
+        let ledger = ledger_of(&trails, &stage.plan(&many));
+        // What several casters' discs cover is emitted more than once.
+        assert!(ledger.entry(Fate::Overlap).count > 100, "{ledger:?}");
+        for sequence in Sequence::ALL {
+            for (seed, aim) in [
+                (0, Aim::Casters),
+                (0x1234_5678_9abc_def0, Aim::Casters),
+                (5, Aim::Everywhere),
+            ] {
+                let options = TraceOptions {
+                    sequence,
+                    seed,
+                    aim,
+                    ..many
+                };
+                let name = format!("sky {sequence} {seed} {aim:?}");
+                let difference = hold(gpu, tracer, &name, &stage, &options);
+                hold_bits(gpu, &difference, &name);
+                // Footprints of both kinds: in the light of the sun, and of the rest.
+                let (overlaps, all) = (difference.overlaps, difference.equal_records.1);
+                assert!(10 * overlaps > all && overlaps < all, "{name}: {overlaps}");
+            }
+        }
+        let mut scene = casters();
+        scene.add_light(lamp()).unwrap();
+        let stage = under(scene, sky(7, 5));
+        let name = "sky and lamp";
+        let difference = hold(gpu, tracer, name, &stage, &options());
+        hold_bits(gpu, &difference, name);
     });
 }
 

@@ -7,7 +7,7 @@
 mod common;
 
 use caustics_geometry::shapes::{heightfield, icosphere};
-use caustics_scene::{Camera, Environment, Instance, Light, Material, Scene, Shape, World};
+use caustics_scene::{Camera, Instance, Light, Material, Scene, Shape, World};
 use caustics_trace::{Culling, SolidAngleLimit, TraceOptions, ViewVolume};
 use caustics_wgpu::glam::{Affine3A, Vec3};
 use caustics_wgpu::{
@@ -355,26 +355,6 @@ fn what_the_shaders_cannot_do_is_an_error() {
             "{named}: {error}"
         );
     }
-    let mut open = glass();
-    open.set_environment(Some(
-        Environment::new(4, 2, vec![[1.0, 0.9, 0.8]; 8]).unwrap(),
-    ));
-    for stage in [
-        Stage::new(World::new(&open).unwrap()),
-        lit(open.clone(), lamp()),
-    ] {
-        let error = TracePlan::new(&stage.world, &stage.rays, &options()).unwrap_err();
-        let what = "light from an environment";
-        assert_eq!(error, GpuError::Unsupported { what });
-    }
-    let corners = [[0.0, 4.0, 0.0], [1.0, 4.0, 0.0], [0.0, 4.0, 1.0]];
-    let shining = lit(glass(), Light::triangle(corners, [1.0; 3]).unwrap());
-    assert_eq!(
-        TracePlan::new(&shining.world, &shining.rays, &options()).unwrap_err(),
-        GpuError::Unsupported {
-            what: "a triangle that shines"
-        }
-    );
     let heavy = TraceOptions {
         min_weight: 2.0,
         ..options()

@@ -9,7 +9,8 @@ const QUARTER_LOW: f32 = 4.838_268e-4;
 /// Those of the standard library are the platform's, and differ between platforms in the last
 /// digit; a shader's differ far more. These are Taylor's series within an eighth of a turn, in
 /// operations that round alike everywhere: photons start alike on any machine.
-pub(super) fn sine_cosine(angle: f32) -> (f32, f32) {
+#[must_use]
+pub fn sine_cosine(angle: f32) -> (f32, f32) {
     let quarters = (angle * FRAC_2_PI).round_ties_even();
     let x = (angle - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW;
     let y = x * x;

@@ -15,6 +15,11 @@ struct AreaPlace {
     is_valid: bool,
 }
 
+// A place, or a step, along two edges.
+fn on_edges(edges: Tangents, along: vec2<f32>) -> vec3<f32> {
+    return along.x * edges.first + along.y * edges.second;
+}
+
 // The place of a sample. Twins: `AreaSurface::place`, `AreaLight::choose`.
 fn area_place(emitter: u32, sample: vec2<f32>) -> AreaPlace {
     var place: AreaPlace;
@@ -29,6 +34,11 @@ fn area_place(emitter: u32, sample: vec2<f32>) -> AreaPlace {
         place.spawn.position = origin + sample.x * tangents.first + sample.y * tangents.second;
         place.d_du = tangents.first;
         place.d_dv = tangents.second;
+    } else if surface == SURFACE_TRIANGLE {
+        let local = square_to_barycentric(sample);
+        place.spawn.position = origin + rounded_vector(on_edges(tangents, local.value));
+        place.d_du = on_edges(tangents, local.d_du);
+        place.d_dv = on_edges(tangents, local.d_dv);
     } else if surface == SURFACE_DISC {
         let local = square_to_disc_concentric(sample);
         let normal = place.normal;

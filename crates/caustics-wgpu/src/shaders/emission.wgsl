@@ -13,6 +13,9 @@ fn emit(emitter: u32, sample: EmissionSample) -> Emission {
     if kind == EMITTER_AREA {
         return emit_from_area(emitter, sample);
     }
+    if kind == EMITTER_SKY {
+        return emit_from_sky(emitter, sample);
+    }
     if kind == EMITTER_RECTANGLE {
         return emit_from_rectangle(emitter, sample);
     }

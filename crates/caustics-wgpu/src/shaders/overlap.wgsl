@@ -38,6 +38,10 @@ fn emitter_covers(emitter: u32, ray: Ray) -> bool {
         let cone = target_height(emitter, distance);
         return cone == 0.0 || in_cone(dot(ray.direction, to_target / distance), cone);
     }
+    if kind == EMITTER_SKY {
+        let across = cross(trace.emitters[emitter].target_center - ray.origin, ray.direction);
+        return length_of(across) <= trace.emitters[emitter].target_radius;
+    }
     var point: vec2<f32>;
     if kind == EMITTER_RECTANGLE {
         let from_corner = ray.origin - trace.emitters[emitter].origin;

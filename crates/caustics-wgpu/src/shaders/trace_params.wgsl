@@ -19,30 +19,32 @@ struct Emitter {
     share: f32,
     // The media around its start, as in `MediumStack`.
     media: vec4<u32>,
-    // The point that rays start from, the rectangle's corner, or the middle of a disc or a ball.
+    // The point that rays start from, the corner of a rectangle or a triangle, or the middle of a disc
+    // or a ball.
     origin: vec3<f32>,
     // Of the cone or the sphere.
     solid_angle: f32,
-    // Of the cone's, the disc's or the cap's frame, or the rectangle's first edge.
+    // Of the cone's, the disc's or the cap's frame, or the first edge of a rectangle or a triangle.
     tangent: vec3<f32>,
     // 1 - cosine of the cone's or the cap's half angle.
     height: f32,
-    // The frame's other axis, or the rectangle's second edge.
+    // The frame's other axis, or the other edge from the corner.
     bitangent: vec3<f32>,
     // Of the spot light's cones; below -1 where all directions are alike.
     inner_cosine: f32,
     // Of the frame, or the rectangle's rays, or the normal of a surface that shines.
     axis: vec3<f32>,
     outer_cosine: f32,
-    // Radiant intensity, irradiance or radiance.
+    // Radiant intensity, irradiance or radiance; of a sky the most that a texel's radiance is of its
+    // density.
     intensity: vec3<f32>,
-    // Of the rectangle or the surface that shines.
+    // Of the rectangle or the surface that shines, or across the sky's target.
     area: f32,
     // Of the spot light.
     spot_axis: vec3<f32>,
     // 1 where an object's front emits, -1 for its back.
     side: f32,
-    // The sphere that an area light aims at; its radius is negative where there is none.
+    // The sphere that an area light or a sky aims at; its radius is negative where there is none.
     target_center: vec3<f32>,
     target_radius: f32,
     // An emissive object's primitives and the place of their cumulative areas.
@@ -68,11 +70,12 @@ struct Emitter {
     first_map: u32,
     // Which kind of surface shines.
     surface: u32,
-    // Of the disc or the ball.
+    // Of the disc or the ball; or how far before its target the sky's rays start.
     radius: f32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    // Where the environment's rows and texels begin, and how many there are; see sky_emission.wgsl.
+    sky_first: u32,
+    sky_width: u32,
+    sky_height: u32,
 }
 
 struct TraceParams {
@@ -114,11 +117,13 @@ const EMITTER_SPHERE: u32 = 0u;
 const EMITTER_CONE: u32 = 1u;
 const EMITTER_RECTANGLE: u32 = 2u;
 const EMITTER_AREA: u32 = 3u;
+const EMITTER_SKY: u32 = 4u;
 
 const SURFACE_OBJECT: u32 = 0u;
 const SURFACE_RECTANGLE: u32 = 1u;
 const SURFACE_DISC: u32 = 2u;
 const SURFACE_CAP: u32 = 3u;
+const SURFACE_TRIANGLE: u32 = 4u;
 
 const NO_CASTER: u32 = 0xffffffffu;
 const NO_MAP: u32 = 0xffffffffu;

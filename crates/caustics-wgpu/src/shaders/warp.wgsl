@@ -12,7 +12,7 @@ struct DirectionSample {
     d_dv: vec3<f32>,
 }
 
-struct DiscSample {
+struct PlaneSample {
     value: vec2<f32>,
     d_du: vec2<f32>,
     d_dv: vec2<f32>,
@@ -38,7 +38,7 @@ fn sine_cosine(angle: f32) -> vec2<f32> {
 }
 
 // Twin: disc_concentric.rs.
-fn square_to_disc_concentric(uv: vec2<f32>) -> DiscSample {
+fn square_to_disc_concentric(uv: vec2<f32>) -> PlaneSample {
     let centred = 2.0 * uv - vec2(1.0);
     let horizontal = abs(centred.x) > abs(centred.y);
     let radius = select(centred.y, centred.x, horizontal);
@@ -53,9 +53,9 @@ fn square_to_disc_concentric(uv: vec2<f32>) -> DiscSample {
         * vec2(angle.y + QUARTER_PI * ratio * angle.x, angle.x - QUARTER_PI * ratio * angle.y);
     let d_other = HALF_PI * vec2(-angle.x, angle.y);
     if horizontal {
-        return DiscSample(value, d_radius, d_other);
+        return PlaneSample(value, d_radius, d_other);
     }
-    return DiscSample(value.yx, d_other.yx, d_radius.yx);
+    return PlaneSample(value.yx, d_other.yx, d_radius.yx);
 }
 
 fn cone_derivative(disc: vec2<f32>, d_disc: vec2<f32>, height: f32, stretch: f32, near: f32) -> vec3<f32> {
@@ -117,6 +117,16 @@ fn square_to_cosine_hemisphere(uv: vec2<f32>) -> DirectionSample {
         vec3(disc.d_du, -dot(disc.value, disc.d_du) / near),
         vec3(disc.d_dv, -dot(disc.value, disc.d_dv) / near),
     );
+}
+
+// Barycentric coordinates of the second and the third corner. Twin: triangle.rs.
+fn square_to_barycentric(uv: vec2<f32>) -> PlaneSample {
+    if uv.y > uv.x {
+        let half = 0.5 * uv.x;
+        return PlaneSample(vec2(half, uv.y - half), vec2(0.5, -0.5), vec2(0.0, 1.0));
+    }
+    let half = 0.5 * uv.y;
+    return PlaneSample(vec2(uv.x - half, half), vec2(1.0, 0.0), vec2(-0.5, 0.5));
 }
 
 // A sample of directions in a frame, turned to the world's axes.

@@ -239,8 +239,6 @@ pub(crate) fn irradiance(
     picture: &Picture,
     batches: &[&[Photon]],
 ) -> Result<(Vec<[f32; 4]>, SplatStats), TestError> {
-    let mut renderer = CausticsRenderer::new(device, options)?;
-    let textures = picture.textures(device, queue);
     let uploaded: Vec<_> = batches
         .iter()
         .map(|batch| upload(device, queue, batch))
@@ -249,9 +247,23 @@ pub(crate) fn irradiance(
         .iter()
         .map(|(records, count)| FootprintBatch { records, count })
         .collect();
+    let light = FrameLight::Footprints(&footprints);
+    irradiance_of(device, queue, options, picture, light)
+}
+
+/// Likewise, of any light.
+pub(crate) fn irradiance_of(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    options: &RendererOptions,
+    picture: &Picture,
+    light: FrameLight<'_>,
+) -> Result<(Vec<[f32; 4]>, SplatStats), TestError> {
+    let mut renderer = CausticsRenderer::new(device, options)?;
+    let textures = picture.textures(device, queue);
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let frame = FrameParams {
-        light: FrameLight::Footprints(&footprints),
+        light,
         views: &[picture.view(&textures)],
     };
     let prepared = renderer.prepare(device, queue, &mut encoder, &frame)?;
