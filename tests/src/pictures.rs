@@ -6,19 +6,29 @@ use caustics_sampling::Sequence;
 use caustics_scene::{Camera, Projection, Scene, World};
 use caustics_trace::{Photon, trace_photons};
 use glam::{Affine3A, DVec2, Mat3, Vec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use crate::TestError;
 use crate::measure::{Region, without_chance};
 use crate::oracles::{
     MirrorCylinder, ParabolicMirror, PlanoConvexLens, RadialLens, SphereLens, WavyWater,
 };
+use crate::pixel_sum::PixelSum;
 
 /// Pixels along each side.
 pub const SIZE: usize = 128;
 
 /// Pixels darker than this part of the mean are not lit.
 const LIT: f64 = 0.05;
+
+/// Rings that the beam of a lens is cut into.
+const RINGS: u32 = 80_000;
+
+/// Squares that the water's surface is cut into each way, for the exact picture where it folds light
+/// and for the tracer. With half as many facets as these the tracer's water is another one by
+/// a relMSE of 1.3e-7 without folds and 1.5e-6 with them, more than what four million photons leave.
+const WATER_SAMPLES: u32 = 2048;
+const WATER_FACETS: u32 = 1024;
 
 /// Half of the width of the water's receiver that is shown, in metres.
 const WATER_HALF: f64 = 0.5;
@@ -76,7 +86,7 @@ impl ExactPicture {
             height: -lens.floor_distance,
             is_lit_from_below: false,
             distance: 0.1,
-            irradiance: radial(&lens, half),
+            irradiance: radial(&lens, half, RINGS),
         })
     }
 
@@ -102,7 +112,7 @@ impl ExactPicture {
             height: -lens.floor_distance,
             is_lit_from_below: false,
             distance: 0.1,
-            irradiance: radial(&lens, half),
+            irradiance: radial(&lens, half, RINGS),
         })
     }
 
@@ -178,7 +188,7 @@ impl ExactPicture {
     pub fn folded_water() -> Result<Self, TestError> {
         let water = WavyWater::with_strength(3.0);
         let area = (2.0 * WATER_HALF / SIZE as f64).powi(2);
-        let flux = water.binned_flux(WATER_HALF, SIZE, 8192);
+        let flux = water.binned_flux(WATER_HALF, SIZE, WATER_SAMPLES);
         let exact = flux.into_iter().map(|flux| flux / area).collect();
         Self::water("folded water", &water, exact)
     }
@@ -190,7 +200,7 @@ impl ExactPicture {
     ) -> Result<Self, TestError> {
         Ok(Self {
             name,
-            scene: water.scene(512)?,
+            scene: water.scene(WATER_FACETS)?,
             events: 1,
             center: DVec2::ZERO,
             half: WATER_HALF,
@@ -303,13 +313,13 @@ fn pixels(center: DVec2, half: f64, flux: impl Fn(DVec2, DVec2) -> f64) -> Vec<f
         .collect()
 }
 
-/// The mean irradiance of pixels around a lens: rings of the beam, spread around the axis.
-fn radial(lens: &impl RadialLens, half: f64) -> Vec<f64> {
-    const RINGS: u32 = 40_000;
+/// The mean irradiance of pixels around a lens: rings of the beam, each a circle on the receiver.
+fn radial(lens: &impl RadialLens, half: f64, rings: u32) -> Vec<f64> {
     let width = 2.0 * half / SIZE as f64;
-    let mut irradiance = vec![0.0; SIZE * SIZE];
-    let step = lens.max_angle() / f64::from(RINGS);
-    for ring in 0..RINGS {
+    let center = DVec2::splat(0.5 * SIZE as f64);
+    let mut sum = PixelSum::new(SIZE);
+    let step = lens.max_angle() / f64::from(rings);
+    for ring in 0..rings {
         let angle = (f64::from(ring) + 0.5) * step;
         let Some(landing) = lens.land(angle) else {
             continue;
@@ -320,18 +330,9 @@ fn radial(lens: &impl RadialLens, half: f64) -> Vec<f64> {
         }
         let area = PI * lens.curvature_radius().powi(2) * (2.0 * angle).sin() * step;
         let flux = lens.irradiance() * area * landing.transmittance;
-        // Eight points for each pixel on the way around.
-        let places = ((TAU * radius / width) * 8.0).ceil().max(8.0) as u32;
-        let share = flux / f64::from(places) / (width * width);
-        for place in 0..places {
-            let turn = TAU * (f64::from(place) + 0.37 * f64::from(ring % 97)) / f64::from(places);
-            let at = (radius * DVec2::from_angle(turn) + half) / width;
-            if at.min_element() >= 0.0 && at.max_element() < SIZE as f64 {
-                irradiance[at.y as usize * SIZE + at.x as usize] += share;
-            }
-        }
+        sum.add_circle(center, radius / width, flux / (width * width));
     }
-    irradiance
+    sum.into_flux()
 }
 
 /// The order of convergence: minus the slope of the error's logarithm over the count's, fitted.

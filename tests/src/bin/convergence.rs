@@ -84,8 +84,14 @@ fn document(series: &[Series]) -> String {
     });
     text.push_str(
         "\nFootprints as small as pixels are integrated over the pixels, as the exact pictures are; wider\n\
-         ones are read at the pixels' middles. What is left at the largest counts, where some rise by a\n\
-         few percent, was not looked into: the kernel is cut at three deviations, and sums are in f32.\n\n\
+         ones are read at the pixels' middles.\n\n\
+         What an exact picture is off by is a floor that no number of photons gets below, and so is what\n\
+         the mesh is off from the surface that the oracle has. The flux of the lenses and of the folded\n\
+         water is therefore shared out over the pixels by the exact parts of arcs and of triangles. Counted\n\
+         by the points at which rays land, 40,000 rings or 8192 x 8192 rays, it was off by a relMSE of 7.3e-6\n\
+         behind the ball and 3.2e-5 at the folds: all that was left of either from 2^18 on. The arcs and\n\
+         triangles are right to 2e-9. The water's mesh has 1024 squares each way; with 512 the folded water\n\
+         stays at 1e-6 and the wavy at 1.2e-7.\n\n\
          ## Outliers\n\n\
          The 99.99th percentile of |t - r| over lit pixels, over the median of the same. The largest errors\n\
          are in pixels at folds and edges, and do not fall as the median does.\n\n",
