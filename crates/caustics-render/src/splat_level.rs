@@ -400,14 +400,31 @@ impl BandTask<'_> {
         }
         let (texels, light) = (self.texels, &mut self.light);
         let (width, first) = (self.width, self.first_row);
-        integral
-            .gaussian
-            .light_pixels(&columns, &rows, weights, |column, row, weight| {
-                if let Some(texel) = &texels[row * width + column] {
+        let gaussian = &integral.gaussian;
+        gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
+            if let Some(texel) = &texels[row * width + column]
+                && splat.shift(integral, texel) == Vec2::ZERO
+            {
+                let target = (row - first) * width + column;
+                light.add(target, splat.integrated(integral, texel, weight));
+            }
+        });
+        // What a curved receiver shows off the plane is the pixel's square moved to where its light
+        // meets the plane.
+        let off_plane = if integral.is_flat { 0..0 } else { rows.clone() };
+        for row in off_plane {
+            for column in columns.clone() {
+                let Some(texel) = &texels[row * width + column] else {
+                    continue;
+                };
+                let shift = splat.shift(integral, texel);
+                if shift != Vec2::ZERO {
+                    let weight = gaussian.moved(shift).weight(column, row, weights);
                     let target = (row - first) * width + column;
                     light.add(target, splat.integrated(integral, texel, weight));
                 }
-            });
+            }
+        }
         let begin = |row: usize| {
             self.extras
                 .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
@@ -416,7 +433,8 @@ impl BandTask<'_> {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
             if columns.contains(&column) {
-                let weight = integral.gaussian.weight(column, row, weights);
+                let shift = splat.shift(integral, texel);
+                let weight = gaussian.moved(shift).weight(column, row, weights);
                 if weight > 0.0 {
                     self.extra_light[index] += splat.integrated(integral, texel, weight);
                 }
