@@ -26,6 +26,7 @@
 //! | [`oracles`] | the arrangements with their closed forms |
 //! | [`measure`] | flux of photons in regions, and its error against the oracle |
 //! | [`pictures`] | the oracles pixel by pixel, and the default estimate against them |
+//! | [`pixel_sum`] | flux of triangles and circles in pixels |
 //! | [`gallery`] | the glTF files of this package |
 //! | [`stage`] | the parts that the oracles' scenes have in common |
 //! | [`optics`] | Snell's and Fresnel's laws in f64 |
@@ -37,6 +38,7 @@ pub mod numerics;
 pub mod optics;
 pub mod oracles;
 pub mod pictures;
+pub mod pixel_sum;
 pub mod stage;
 
 /// Whatever may go wrong in a test.

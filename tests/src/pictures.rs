@@ -6,19 +6,31 @@ use caustics_sampling::Sequence;
 use caustics_scene::{Camera, Projection, Scene, World};
 use caustics_trace::{Photon, trace_photons};
 use glam::{Affine3A, DVec2, Mat3, Vec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use crate::TestError;
 use crate::measure::{Region, without_chance};
+use crate::numerics::integrate;
 use crate::oracles::{
-    MirrorCylinder, ParabolicMirror, PlanoConvexLens, RadialLens, SphereLens, WavyWater,
+    FlatWater, LensOverCap, MirrorCylinder, ParabolicMirror, PlanoConvexLens, RadialLens,
+    SphereLens, SunOverRipples, WavyWater,
 };
+use crate::pixel_sum::PixelSum;
 
 /// Pixels along each side.
 pub const SIZE: usize = 128;
 
 /// Pixels darker than this part of the mean are not lit.
 const LIT: f64 = 0.05;
+
+/// Rings that the beam of a lens is cut into.
+const RINGS: u32 = 80_000;
+
+/// Squares that the water's surface is cut into each way, for the exact picture where it folds light
+/// and for the tracer. With half as many facets as these the tracer's water is another one by
+/// a relMSE of 1.3e-7 without folds and 1.5e-6 with them, more than what four million photons leave.
+const WATER_SAMPLES: u32 = 2048;
+const WATER_FACETS: u32 = 1024;
 
 /// Half of the width of the water's receiver that is shown, in metres.
 const WATER_HALF: f64 = 0.5;
@@ -76,7 +88,7 @@ impl ExactPicture {
             height: -lens.floor_distance,
             is_lit_from_below: false,
             distance: 0.1,
-            irradiance: radial(&lens, half),
+            irradiance: radial(&lens, half, RINGS),
         })
     }
 
@@ -102,7 +114,7 @@ impl ExactPicture {
             height: -lens.floor_distance,
             is_lit_from_below: false,
             distance: 0.1,
-            irradiance: radial(&lens, half),
+            irradiance: radial(&lens, half, RINGS),
         })
     }
 
@@ -178,7 +190,7 @@ impl ExactPicture {
     pub fn folded_water() -> Result<Self, TestError> {
         let water = WavyWater::with_strength(3.0);
         let area = (2.0 * WATER_HALF / SIZE as f64).powi(2);
-        let flux = water.binned_flux(WATER_HALF, SIZE, 8192);
+        let flux = water.binned_flux(WATER_HALF, SIZE, WATER_SAMPLES);
         let exact = flux.into_iter().map(|flux| flux / area).collect();
         Self::water("folded water", &water, exact)
     }
@@ -190,7 +202,7 @@ impl ExactPicture {
     ) -> Result<Self, TestError> {
         Ok(Self {
             name,
-            scene: water.scene(512)?,
+            scene: water.scene(WATER_FACETS)?,
             events: 1,
             center: DVec2::ZERO,
             half: WATER_HALF,
@@ -201,7 +213,89 @@ impl ExactPicture {
         })
     }
 
-    /// All of them.
+    /// Light that a lens gathers on a part of a sphere of this curvature, per metre, at most 3 either
+    /// way: above 0 a hill, below a bowl.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn curved_under_lens(curvature: f64) -> Result<Self, TestError> {
+        let half = 0.3;
+        let cap = LensOverCap {
+            lens: PlanoConvexLens {
+                curvature_radius: 1.0,
+                aperture: 0.5,
+                ior: 1.5,
+                floor_distance: 0.9,
+                irradiance: 2.0,
+            },
+            curvature,
+            rim: 0.3,
+        };
+        let width = 2.0 * half / SIZE as f64;
+        let mut sum = PixelSum::new(SIZE);
+        let step = cap.lens.max_angle() / f64::from(RINGS);
+        for ring in 0..RINGS {
+            let angle = (f64::from(ring) + 0.5) * step;
+            if let Some(landing) = cap.land(angle) {
+                // What a pixel sees of the slope is wider than the pixel.
+                let flux = cap.ring_flux(angle, step) * landing.transmittance * landing.upright;
+                let center = DVec2::splat(0.5 * SIZE as f64);
+                sum.add_circle(center, landing.radius / width, flux / (width * width));
+            }
+        }
+        Ok(Self {
+            name: "lens over a sphere",
+            scene: cap.scene(4096, 256)?,
+            events: 2,
+            center: DVec2::ZERO,
+            half,
+            height: -cap.lens.floor_distance,
+            is_lit_from_below: false,
+            distance: 0.3,
+            irradiance: sum.into_flux(),
+        })
+    }
+
+    /// Slanting sun through still water on ripples with this curvature, per metre, on their crests and
+    /// in their troughs; at least 3.
+    ///
+    /// # Errors
+    /// If the scene cannot be made.
+    pub fn ripples_in_sun(curvature: f64) -> Result<Self, TestError> {
+        let half = 0.2;
+        let ripples = SunOverRipples {
+            water: FlatWater {
+                ior: 1.33,
+                half_width: 0.5,
+                depth: 0.2,
+                attenuation: 0.0,
+                angle: 0.9,
+                sun: 2.0,
+            },
+            slope: 0.6,
+            curvature,
+            half_width: 0.3,
+        };
+        let width = 2.0 * half / SIZE as f64;
+        let column = |column: usize| {
+            let start = column as f64 * width - half;
+            integrate(|x| ripples.irradiance_at(x), start, start + width, 4) / width
+        };
+        let row: Vec<f64> = (0..SIZE).map(column).collect();
+        Ok(Self {
+            name: "sun on ripples",
+            scene: ripples.scene(16_384)?,
+            events: 1,
+            center: DVec2::ZERO,
+            half,
+            height: 0.0,
+            is_lit_from_below: false,
+            distance: 0.15,
+            irradiance: row.repeat(SIZE),
+        })
+    }
+
+    /// All that have flat receivers.
     ///
     /// # Errors
     /// If a scene cannot be made.
@@ -221,31 +315,46 @@ impl ExactPicture {
     /// # Errors
     /// If the scene cannot be traced or splatted.
     pub fn estimated(&self, photons: u32, seed: u64) -> Result<Vec<f64>, TestError> {
+        let [picture] = self.estimated_from(photons, seed, [|photon| photon])?;
+        Ok(picture)
+    }
+
+    /// The irradiance that the default estimate gives from so many photons, once for each of several
+    /// ways to change them.
+    ///
+    /// # Errors
+    /// If the scene cannot be traced or splatted.
+    pub fn estimated_from<const N: usize>(
+        &self,
+        photons: u32,
+        seed: u64,
+        changes: [fn(Photon) -> Photon; N],
+    ) -> Result<[Vec<f64>; N], TestError> {
         let world = World::new(&self.scene)?;
         let intersector = world.intersector(&BvhOptions::default())?;
         let mut options = without_chance(Sequence::Grid, self.events + 1);
         (options.photons, options.seed) = (photons, seed);
         let map = trace_photons(&world, &intersector, &options, &|_| {})?;
-        let counted: Vec<Photon> = map
-            .photons
-            .into_iter()
-            .filter(|photon| photon.events == self.events)
-            .collect();
         let size = SIZE as u32;
         let buffer = GBuffer::new(&world, &intersector, &self.camera()?, size, size)?;
-        let (image, _) = splat(&buffer, &counted, &FootprintOptions::default())?;
-        // The receiver's albedo is a half.
-        let irradiance = |pixel: &[f32; 3]| 2.0 * PI * f64::from(pixel[0]);
-        let rows: Vec<&[[f32; 3]]> = image.pixels().chunks(SIZE).collect();
-        let in_order: Vec<&&[[f32; 3]]> = if self.is_lit_from_below {
-            rows.iter().rev().collect()
-        } else {
-            rows.iter().collect()
-        };
-        Ok(in_order
-            .into_iter()
-            .flat_map(|row| row.iter().map(irradiance))
-            .collect())
+        let mut pictures = [const { Vec::new() }; N];
+        for (picture, change) in pictures.iter_mut().zip(changes) {
+            let photons = map.photons.iter().copied();
+            let counted: Vec<Photon> = photons
+                .filter(|photon| photon.events == self.events)
+                .map(change)
+                .collect();
+            let (image, _) = splat(&buffer, &counted, &FootprintOptions::default())?;
+            // The receiver's albedo is a half.
+            let irradiance = |pixel: &[f32; 3]| 2.0 * PI * f64::from(pixel[0]);
+            let rows = image.pixels().chunks(SIZE);
+            *picture = if self.is_lit_from_below {
+                rows.rev().flatten().map(irradiance).collect()
+            } else {
+                rows.flatten().map(irradiance).collect()
+            };
+        }
+        Ok(pictures)
     }
 
     /// Close before the receiver, on its lit side, with rows along z, upwards from below.
@@ -291,6 +400,18 @@ impl ExactPicture {
     }
 }
 
+/// A photon whose light falls straight on the plane of its footprint: the plain plane, for comparison
+/// with points of a receiver followed along the light. What it lights off the plane is projected along
+/// the normal, and as bright as what it lights in the plane but for the cosine between the normals, by
+/// which no flux is won or lost.
+#[must_use]
+pub fn on_plain_plane(photon: Photon) -> Photon {
+    Photon {
+        incoming: -photon.normal,
+        ..photon
+    }
+}
+
 /// The mean irradiance of pixels from the flux that they get.
 fn pixels(center: DVec2, half: f64, flux: impl Fn(DVec2, DVec2) -> f64) -> Vec<f64> {
     let width = 2.0 * half / SIZE as f64;
@@ -303,13 +424,13 @@ fn pixels(center: DVec2, half: f64, flux: impl Fn(DVec2, DVec2) -> f64) -> Vec<f
         .collect()
 }
 
-/// The mean irradiance of pixels around a lens: rings of the beam, spread around the axis.
-fn radial(lens: &impl RadialLens, half: f64) -> Vec<f64> {
-    const RINGS: u32 = 40_000;
+/// The mean irradiance of pixels around a lens: rings of the beam, each a circle on the receiver.
+fn radial(lens: &impl RadialLens, half: f64, rings: u32) -> Vec<f64> {
     let width = 2.0 * half / SIZE as f64;
-    let mut irradiance = vec![0.0; SIZE * SIZE];
-    let step = lens.max_angle() / f64::from(RINGS);
-    for ring in 0..RINGS {
+    let center = DVec2::splat(0.5 * SIZE as f64);
+    let mut sum = PixelSum::new(SIZE);
+    let step = lens.max_angle() / f64::from(rings);
+    for ring in 0..rings {
         let angle = (f64::from(ring) + 0.5) * step;
         let Some(landing) = lens.land(angle) else {
             continue;
@@ -320,18 +441,9 @@ fn radial(lens: &impl RadialLens, half: f64) -> Vec<f64> {
         }
         let area = PI * lens.curvature_radius().powi(2) * (2.0 * angle).sin() * step;
         let flux = lens.irradiance() * area * landing.transmittance;
-        // Eight points for each pixel on the way around.
-        let places = ((TAU * radius / width) * 8.0).ceil().max(8.0) as u32;
-        let share = flux / f64::from(places) / (width * width);
-        for place in 0..places {
-            let turn = TAU * (f64::from(place) + 0.37 * f64::from(ring % 97)) / f64::from(places);
-            let at = (radius * DVec2::from_angle(turn) + half) / width;
-            if at.min_element() >= 0.0 && at.max_element() < SIZE as f64 {
-                irradiance[at.y as usize * SIZE + at.x as usize] += share;
-            }
-        }
+        sum.add_circle(center, radius / width, flux / (width * width));
     }
-    irradiance
+    sum.into_flux()
 }
 
 /// The order of convergence: minus the slope of the error's logarithm over the count's, fitted.

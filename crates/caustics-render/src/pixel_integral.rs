@@ -90,6 +90,28 @@ impl PixelGaussian {
         }
     }
 
+    /// Its middle, in pixels.
+    pub(crate) fn middle(&self) -> Vec2 {
+        if self.is_wide {
+            self.center
+        } else {
+            Vec2::new(self.center.y, self.center.x)
+        }
+    }
+
+    /// The same, moved by so many pixels.
+    pub(crate) fn moved(&self, shift: Vec2) -> Self {
+        let shift = if self.is_wide {
+            shift
+        } else {
+            Vec2::new(shift.y, shift.x)
+        };
+        Self {
+            center: self.center + shift,
+            ..*self
+        }
+    }
+
     /// Half the sides of the rectangle that holds it, in pixels.
     pub(crate) fn extent(&self) -> Vec2 {
         let along = CUT * self.long;

@@ -45,6 +45,10 @@ const LEAST_REACH: f32 = 0.75;
 /// perspective bends it.
 const INTEGRATED_EXTENT: f32 = 48.0;
 
+/// The farthest, in pixels, that light may slide on its way to a footprint's plane for a pixel to be in
+/// the plane.
+const NEGLIGIBLE_SHIFT: f32 = 1e-3;
+
 /// The least cosine between the view and the normal of a footprint at which its blur serves for what
 /// stands before its plane, too. A plane that is seen edge-on blurs its footprints by a pixel that is
 /// long on the plane, but not on what stands before it.
@@ -81,6 +85,11 @@ pub(crate) struct PixelIntegral {
     pub(crate) gaussian: PixelGaussian,
     /// What a pixel with all of the flux would have for irradiance, over the incident cosine.
     pub(crate) strength: Vec3,
+    /// How far, in pixels, what lies a metre before the plane is seen from where its light meets the
+    /// plane.
+    shift: Vec2,
+    /// Whether what it lights lies in its plane, as far as pixels can tell.
+    pub(crate) is_flat: bool,
 }
 
 impl PixelIntegral {
@@ -89,6 +98,7 @@ impl PixelIntegral {
         photon: &Photon,
         pixel: &[Vec3; 2],
         center: Vec2,
+        shift: Vec2,
         options: &FootprintOptions,
         kernel: TruncatedKernel,
     ) -> Option<Self> {
@@ -105,7 +115,30 @@ impl PixelIntegral {
         let strength = photon.flux * (to_pixels.determinant().abs() / incident_cosine(photon));
         let limit = integrated_sigma(photon.coverage, kernel);
         let is_small = short < limit * limit && gaussian.extent().max_element() < INTEGRATED_EXTENT;
-        (is_small && strength.is_finite()).then_some(Self { gaussian, strength })
+        (is_small && strength.is_finite()).then_some(Self {
+            gaussian,
+            strength,
+            shift,
+            is_flat: true,
+        })
+    }
+
+    /// The pixels that may see what it lights between two heights before its plane, in metres.
+    fn bounds(&mut self, heights: [f32; 2]) -> Bounds {
+        let center = self.gaussian.middle();
+        let extent = self.gaussian.extent();
+        let [one, other] = heights.map(|height| height * self.shift);
+        self.is_flat = one.length().max(other.length()) <= NEGLIGIBLE_SHIFT;
+        let (mut low, mut high) = (center - extent, center + extent);
+        if !self.is_flat {
+            low += one.min(other).min(Vec2::ZERO);
+            high += one.max(other).max(Vec2::ZERO);
+        }
+        Bounds {
+            low,
+            high,
+            is_exact: true,
+        }
     }
 }
 
@@ -233,7 +266,8 @@ impl Splat {
             rows: [0; 2],
             integral: None,
         };
-        let half_pixel = 0.5 / pixels_per_height(&splat.density, screen);
+        let shift = pixels_per_height(&splat.density, screen);
+        let half_pixel = shift.map_or(0.0, |shift| 0.5 / shift.length());
         let is_coarse = splat.is_linear
             && photon.coverage == Coverage::Overlap
             && kernel.shape == FootprintKernel::Gaussian
@@ -253,17 +287,13 @@ impl Splat {
         let limit = integrated_sigma(photon.coverage, kernel);
         let blurred = 1.01 * (limit * limit + kernel.shape.pixel_variance());
         if splat.is_linear && sigma * sigma < blurred && !surroundings.is_glossy {
-            splat.integral =
-                pixel.and_then(|pixel| PixelIntegral::of(photon, &pixel, center, options, kernel));
+            let shift = shift.unwrap_or_default();
+            splat.integral = pixel.and_then(|pixel| {
+                PixelIntegral::of(photon, &pixel, center, shift, options, kernel)
+            });
         }
-        if let Some(integral) = splat.integral {
-            let extent = integral.gaussian.extent();
-            let (low, high, is_exact) = (center - extent, center + extent, true);
-            let bounds = Bounds {
-                low,
-                high,
-                is_exact,
-            };
+        if let Some(integral) = &mut splat.integral {
+            let bounds = integral.bounds(in_reach.heights);
             splat.place(&bounds, screen);
             return Prepared::Splat(splat);
         }
@@ -402,6 +432,24 @@ impl Splat {
         }
     }
 
+    /// How far, in pixels, what a pixel sees is from where its light meets the footprint's plane, where
+    /// the receiver curves; zero in the plane, and on what catches the light before it.
+    #[inline]
+    pub(crate) fn shift(&self, integral: &PixelIntegral, texel: &Texel) -> Vec2 {
+        let density = &self.density;
+        let normal_cosine = texel.normal.dot(density.normal);
+        let curves = texel.object == density.object && normal_cosine >= self.gate.normal_cosine;
+        if integral.is_flat || !curves {
+            return Vec2::ZERO;
+        }
+        let shift = (texel.position - density.center).dot(density.normal) * integral.shift;
+        if shift.length_squared() <= NEGLIGIBLE_SHIFT * NEGLIGIBLE_SHIFT {
+            Vec2::ZERO
+        } else {
+            shift
+        }
+    }
+
     fn admits(&self, texel: &Texel) -> bool {
         self.gate.admits(
             &self.density,
@@ -423,14 +471,11 @@ impl Splat {
 }
 
 /// How far, in pixels, what lies a metre before a footprint's plane is seen from where its light
-/// meets the plane; infinite where that cannot be seen.
-fn pixels_per_height(density: &Density, screen: &Screen) -> f32 {
+/// meets the plane; `None` where that cannot be seen.
+fn pixels_per_height(density: &Density, screen: &Screen) -> Option<Vec2> {
     let height = 0.1 * density.radius();
     let shifted = screen.project(density.center + height * density.towards_light());
-    match (screen.project(density.center), shifted) {
-        (Some(from), Some(to)) => from.distance(to) / height,
-        _ => f32::INFINITY,
-    }
+    Some((shifted? - screen.project(density.center)?) / height)
 }
 
 /// The smallest standard deviation across the screen, in pixels.

@@ -403,7 +403,9 @@ impl BandTask<'_> {
         let (width, first) = (self.width, self.first_row);
         let gaussian = &integral.gaussian;
         gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
-            if let Some(texel) = &texels[row * width + column] {
+            if let Some(texel) = &texels[row * width + column]
+                && splat.shift(integral, texel) == Vec2::ZERO
+            {
                 let target = (row - first) * width + column;
                 let weight = if texel.samples == PixelSamples::ALL {
                     weight
@@ -413,6 +415,23 @@ impl BandTask<'_> {
                 light.add(target, splat.integrated(integral, texel, weight));
             }
         });
+        // What a curved receiver shows off the plane is the pixel's square moved to where its light
+        // meets the plane.
+        let off_plane = if integral.is_flat { 0..0 } else { rows.clone() };
+        for row in off_plane {
+            for column in columns.clone() {
+                let Some(texel) = &texels[row * width + column] else {
+                    continue;
+                };
+                let shift = splat.shift(integral, texel);
+                if shift != Vec2::ZERO {
+                    let moved = gaussian.moved(shift);
+                    let weight = moved.part(column, row, texel.samples, weights) / texel.coverage;
+                    let target = (row - first) * width + column;
+                    light.add(target, splat.integrated(integral, texel, weight));
+                }
+            }
+        }
         let begin = |row: usize| {
             self.extras
                 .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
@@ -421,7 +440,8 @@ impl BandTask<'_> {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
             if columns.contains(&column) {
-                let weight = gaussian.part(column, row, texel.samples, weights);
+                let moved = gaussian.moved(splat.shift(integral, texel));
+                let weight = moved.part(column, row, texel.samples, weights);
                 if weight > 0.0 {
                     self.extra_light[index] +=
                         splat.integrated(integral, texel, weight / texel.coverage);

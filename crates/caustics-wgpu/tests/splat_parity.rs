@@ -2,9 +2,11 @@
 
 mod stage;
 
+use caustics_geometry::shapes;
 use caustics_render::{FootprintKernel, FootprintOptions};
-use caustics_scene::Camera;
-use caustics_wgpu::glam::Vec3;
+use caustics_scene::{Camera, Instance, Light, Material, Scene, Shape};
+use caustics_trace::Photon;
+use caustics_wgpu::glam::{Vec2, Vec3};
 use caustics_wgpu::{RendererOptions, SplatKernel, SplatMethod, SplatOptions, wgpu};
 use stage::{Stage, TestError, device_with, differences, irradiance};
 
@@ -122,6 +124,67 @@ fn planes_seen_edge_on_and_what_stands_before_them_are_lit_as_on_the_cpu() -> Re
             println!("{name}: off by {off:.2e}, {wrong:.2e} of the pixels, {stats:?}");
             assert!(off < OFF, "{name}: {off}, {wrong} of the pixels, {stats:?}");
         }
+    }
+    Ok(())
+}
+
+/// Still water in slanting sun over ripples, seen from within.
+fn ripples() -> Result<Stage, TestError> {
+    let mut scene = Scene::new();
+    let corner = Vec3::new(-0.5, 0.2, 0.5);
+    let surface = shapes::quad(corner, Vec3::X, Vec3::NEG_Z)?;
+    let (slope, number) = (0.6f32, 50.0f32);
+    let bottom = shapes::heightfield_with_slope(
+        [0.6, 0.6],
+        [4096, 1],
+        |x, _| slope / number * (number * x).sin(),
+        |x, _| Vec2::new(slope * (number * x).cos(), 0.0),
+    )?;
+    let parts = [
+        (surface, Material::dielectric("water", 1.33)),
+        (bottom, Material::diffuse("sand", [0.5; 3])),
+    ];
+    for (mesh, material) in parts {
+        let (mesh, material) = (scene.add_mesh(mesh), scene.add_material(material)?);
+        scene.add_instance(Instance::new("part", Shape::Mesh(mesh), material))?;
+    }
+    scene.add_light(Light::directional([0.78, -0.62, 0.0], [1.0; 3])?)?;
+    let eye = [0.05, 0.18, 0.2];
+    scene.add_camera(Camera::look_at("within", eye, [0.0; 3], Vec3::Y, 0.8)?)?;
+    Stage::of(&scene, 200_000)
+}
+
+#[test]
+fn curved_receivers_are_followed_as_on_the_cpu() -> Result<(), TestError> {
+    let quads = SplatOptions {
+        method: SplatMethod::Quads,
+        ..SplatOptions::default()
+    };
+    let stage = ripples()?;
+    let picture = stage.picture(&stage.camera, SIZE);
+    let expected = stage.splat(&picture, &FootprintOptions::default())?;
+    for (features, splat) in [
+        (wgpu::Features::empty(), SplatOptions::default()),
+        (wgpu::Features::FLOAT32_BLENDABLE, quads),
+    ] {
+        let Some((device, queue)) = device_with(features) else {
+            return Ok(());
+        };
+        let run = |photons: &[Photon]| {
+            let (found, _) = irradiance(&device, &queue, &with(splat), &picture, &[photons])?;
+            Ok::<_, TestError>(differences(&picture, &picture.radiance(&found), &expected))
+        };
+        let (off, wrong) = run(&stage.photons)?;
+        println!("off by {off:.2e}, {wrong:.2e} of the pixels");
+        assert!(off < OFF, "{off}, {wrong} of the pixels");
+        // Control: light that falls straight on each footprint's plane makes another picture.
+        let straight = |photon: &Photon| Photon {
+            incoming: -photon.normal,
+            ..*photon
+        };
+        let (plain, _) = run(&stage.photons.iter().map(straight).collect::<Vec<_>>())?;
+        println!("plain planes: off by {plain:.2e}");
+        assert!(plain > 2.0 * OFF, "{plain}");
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Measures the default estimate's error against the number of photons on the exact oracles, and
-//! writes `docs/convergence.md` and `docs/convergence.svg`.
+//! writes `docs/convergence.md` and `docs/convergence.svg`: on flat receivers for the order, on curved
+//! ones for whether footprints follow them.
 //!
 //! `cargo run --release -p caustics-tests --bin convergence`
 
@@ -8,13 +9,33 @@ use std::fs;
 use std::path::PathBuf;
 
 use caustics_tests::TestError;
-use caustics_tests::pictures::{ExactPicture, PictureError, SIZE, fitted_order};
+use caustics_tests::pictures::{ExactPicture, PictureError, SIZE, fitted_order, on_plain_plane};
 
 /// The least and the largest count, as powers of two, and the step between.
 const COUNTS: [u32; 3] = [10, 22, 2];
 
+/// The counts on curved receivers.
+const CURVED_COUNTS: [u32; 5] = [10, 12, 14, 16, 18];
+
+/// Curvatures of spheres under a lens and of ripples in the sun, per metre.
+const CAPS: [f64; 5] = [0.0, 1.0, -1.0, 3.0, -3.0];
+const RIPPLES: [f64; 3] = [3.0, 10.0, 30.0];
+
 /// Up to which power of two the order is fitted: beyond, errors are those of the pixel's blur.
 const FITTED: u32 = 16;
+
+/// What the table of curved receivers says.
+const CURVED_FOUND: &str = "\n\
+    On ripples of curvature 30 the error of footprints that are followed is a fifth of the plain planes'\n\
+    and less from 2^12 on, and a fiftieth at 2^12; with 2^10, footprints are as long as ripples. On what\n\
+    hardly curves, 3 for ripples and 1 under the lens, it makes a few percent of difference. Under the\n\
+    lens at 3 plain planes have 5 to 40 % less. Likely causes, not told apart: each footprint follows\n\
+    its own photon, as though its light were parallel, because nothing is known of how it converges; and\n\
+    in the bowl the light ends where it grazes the slope, at 80 degrees, which stretches the blur of its\n\
+    edge.\n\n\
+    Footprints that are integrated over pixels, from 2^16 on here, are followed by moving each pixel's\n\
+    square to where the light of what it sees meets the plane. Lit by the cosine of what the pixel sees\n\
+    but not moved, ripples of curvature 30 have 1.1e-4 with 2^16, more than with 2^14.\n";
 
 /// Colours that stay apart for most eyes (Okabe and Ito 2008).
 const COLORS: [&str; 6] = [
@@ -52,18 +73,61 @@ impl Series {
     }
 }
 
+/// The relMSE on a curved receiver, for each count.
+struct Curved {
+    name: &'static str,
+    curvature: f64,
+    followed: Vec<f64>,
+    plain: Vec<f64>,
+}
+
+impl Curved {
+    fn measure(curvature: f64, picture: &ExactPicture) -> Result<Self, TestError> {
+        let mut errors = [Vec::new(), Vec::new()];
+        for power in CURVED_COUNTS {
+            let pictures =
+                picture.estimated_from(1 << power, 0, [|photon| photon, on_plain_plane])?;
+            for (errors, estimate) in errors.iter_mut().zip(pictures) {
+                errors.push(picture.error(&estimate).relative_mse);
+            }
+        }
+        let [followed, plain] = errors;
+        println!(
+            "{} {curvature}: {followed:?}, plain {plain:?}",
+            picture.name
+        );
+        Ok(Self {
+            name: picture.name,
+            curvature,
+            followed,
+            plain,
+        })
+    }
+
+    fn all() -> Result<Vec<Self>, TestError> {
+        let caps = CAPS.iter().map(|&curvature| {
+            Self::measure(curvature, &ExactPicture::curved_under_lens(curvature)?)
+        });
+        let ripples = RIPPLES
+            .iter()
+            .map(|&curvature| Self::measure(curvature, &ExactPicture::ripples_in_sun(curvature)?));
+        caps.chain(ripples).collect()
+    }
+}
+
 fn main() -> Result<(), TestError> {
     let series: Vec<Series> = ExactPicture::all()?
         .iter()
         .map(Series::measure)
         .collect::<Result<_, _>>()?;
+    let curved = Curved::all()?;
     let docs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs");
     fs::write(docs.join("convergence.svg"), chart(&series))?;
-    fs::write(docs.join("convergence.md"), document(&series))?;
+    fs::write(docs.join("convergence.md"), document(&series, &curved))?;
     Ok(())
 }
 
-fn document(series: &[Series]) -> String {
+fn document(series: &[Series], curved: &[Curved]) -> String {
     let [first, last, step] = COUNTS;
     let powers: Vec<u32> = (first..=last).step_by(step as usize).collect();
     let mut text = format!(
@@ -84,8 +148,14 @@ fn document(series: &[Series]) -> String {
     });
     text.push_str(
         "\nFootprints as small as pixels are integrated over the pixels, as the exact pictures are; wider\n\
-         ones are read at the pixels' middles. What is left at the largest counts, where some rise by a\n\
-         few percent, was not looked into: the kernel is cut at three deviations, and sums are in f32.\n\n\
+         ones are read at the pixels' middles.\n\n\
+         What an exact picture is off by is a floor that no number of photons gets below, and so is what\n\
+         the mesh is off from the surface that the oracle has. The flux of the lenses and of the folded\n\
+         water is therefore shared out over the pixels by the exact parts of arcs and of triangles. Counted\n\
+         by the points at which rays land, 40,000 rings or 8192 x 8192 rays, it was off by a relMSE of 7.3e-6\n\
+         behind the ball and 3.2e-5 at the folds: all that was left of either from 2^18 on. The arcs and\n\
+         triangles are right to 2e-9. The water's mesh has 1024 squares each way; with 512 the folded water\n\
+         stays at 1e-6 and the wavy at 1.2e-7.\n\n\
          ## Outliers\n\n\
          The 99.99th percentile of |t - r| over lit pixels, over the median of the same. The largest errors\n\
          are in pixels at folds and edges, and do not fall as the median does.\n\n",
@@ -96,7 +166,35 @@ fn document(series: &[Series]) -> String {
         } = one.errors[index].1;
         format!("{:.0}", outliers / median)
     });
+    curved_receivers(&mut text, curved);
     text
+}
+
+fn curved_receivers(text: &mut String, curved: &[Curved]) {
+    text.push_str(
+        "\n## Curved receivers\n\n\
+         A footprint is an ellipse in its receiver's tangent plane. What lies off the plane, because the\n\
+         receiver curves, is followed along the photon's direction to the plane, and lit by its own cosine.\n\
+         Beside it, after the stroke, is the plain plane: the same photons as though their light fell\n\
+         straight on it. Both are relMSE. The lens's light converges; the sun's, through still water, is\n\
+         parallel, 36 degrees off the vertical. Curvatures are per metre, on pictures 0.6 m and 0.4 m wide:\n\
+         above 0 a hill, below a bowl; ripples have both, with slopes up to 0.6.\n\n\
+         | receiver | curvature |",
+    );
+    for power in CURVED_COUNTS {
+        let _ = write!(text, " 2^{power} |");
+    }
+    text.push_str("\n| --- | ---: |");
+    text.push_str(&" ---: |".repeat(CURVED_COUNTS.len()));
+    text.push('\n');
+    for one in curved {
+        let _ = write!(text, "| {} | {} |", one.name, one.curvature);
+        for (followed, plain) in one.followed.iter().zip(&one.plain) {
+            let _ = write!(text, " {followed:.2e} / {plain:.2e} |");
+        }
+        text.push('\n');
+    }
+    text.push_str(CURVED_FOUND);
 }
 
 fn table(

@@ -50,18 +50,24 @@ impl FlatWater {
     /// If a number is out of range.
     pub fn scene(&self) -> Result<Scene, TestError> {
         let mut scene = Scene::new();
+        self.add_to(&mut scene)?;
+        add_receiver(&mut scene, 2.0 * self.half_width + 2.0 * self.depth, 0.0)?;
+        Ok(scene)
+    }
+
+    /// Adds the water and the sun.
+    pub(super) fn add_to(&self, scene: &mut Scene) -> Result<(), TestError> {
         let half = self.half_width as f32;
         let corner = Vec3::new(-half, self.depth as f32, half);
         let surface = shapes::quad(corner, 2.0 * half * Vec3::X, -2.0 * half * Vec3::Z)?;
         let water = Material::dielectric("water", self.ior as f32)
             .with_attenuation([self.attenuation as f32; 3]);
-        add_mesh(&mut scene, "water", surface, water)?;
-        add_receiver(&mut scene, 2.0 * self.half_width + 2.0 * self.depth, 0.0)?;
-        add_sun(&mut scene, self.angle, self.sun)?;
-        Ok(scene)
+        add_mesh(scene, "water", surface, water)?;
+        add_sun(scene, self.angle, self.sun)
     }
 
-    fn refracted_angle(&self) -> f64 {
+    /// Of the light in the water, off the vertical, in radians.
+    pub(super) fn refracted_angle(&self) -> f64 {
         (self.angle.sin() / self.ior).asin()
     }
 }

@@ -1,5 +1,6 @@
 //! Arrangements of a light, a specular body and a receiver whose caustic is known exactly.
 
+mod curved_receiver;
 mod flat_water;
 mod glass_slab;
 mod mirror_cylinder;
@@ -9,6 +10,7 @@ mod radial_lens;
 mod sphere_lens;
 mod wavy_water;
 
+pub use curved_receiver::{CapLanding, LensOverCap, SunOverRipples};
 pub use flat_water::FlatWater;
 pub use glass_slab::GlassSlab;
 pub use mirror_cylinder::MirrorCylinder;

@@ -39,6 +39,18 @@ impl PlanoConvexLens {
     /// If a number is out of range.
     pub fn scene(&self, rings: u32, segments: u32) -> Result<Scene, TestError> {
         let mut scene = Scene::new();
+        self.add_to(&mut scene, rings, segments)?;
+        add_receiver(&mut scene, 4.0 * self.aperture, -self.floor_distance)?;
+        Ok(scene)
+    }
+
+    /// Adds the lens and the sun.
+    pub(super) fn add_to(
+        &self,
+        scene: &mut Scene,
+        rings: u32,
+        segments: u32,
+    ) -> Result<(), TestError> {
         let rim = Vec2::new(self.aperture as f32, 0.0);
         let down = Vec2::NEG_Y;
         let mut profile = vec![
@@ -65,14 +77,12 @@ impl PlanoConvexLens {
         }));
         let lens = revolution_with_normals(&profile, segments)?;
         add_mesh(
-            &mut scene,
+            scene,
             "lens",
             lens,
             Material::dielectric("glass", self.ior as f32),
         )?;
-        add_receiver(&mut scene, 4.0 * self.aperture, -self.floor_distance)?;
-        add_sun(&mut scene, 0.0, self.irradiance)?;
-        Ok(scene)
+        add_sun(scene, 0.0, self.irradiance)
     }
 
     /// From the flat back down to the front's centre of curvature, in metres.

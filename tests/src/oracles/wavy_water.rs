@@ -5,6 +5,7 @@ use glam::{DMat2, DVec2, DVec3, Vec2};
 use crate::TestError;
 use crate::numerics::integrate_rectangle;
 use crate::optics::{refract, transmittance};
+use crate::pixel_sum::PixelSum;
 use crate::stage::{add_mesh, add_receiver, add_sun};
 
 /// One sine wave of a [`WavyWater`].
@@ -125,24 +126,37 @@ impl WavyWater {
     }
 
     /// Flux that lands in each of `cells` by `cells` equal squares of the receiver between -`half`
-    /// and `half`, in watts, row by row along z: `samples` by `samples` rays over the whole surface,
-    /// each with its share of the beam, folds and all.
+    /// and `half`, in watts, row by row along z, folds and all: the surface in `samples` by
+    /// `samples` squares of two triangles, the flux of each spread evenly over the triangle that
+    /// its corners land at.
+    ///
+    /// Counted by the points at which single rays land, the flux of a square is off by those that
+    /// fall on either side of its border: by a third of a percent with a thousand of them in it.
+    /// Triangles are off by how much the map bends within one, which falls with the fourth power of
+    /// their size in the mean square.
     #[must_use]
     pub fn binned_flux(&self, half: f64, cells: usize, samples: u32) -> Vec<f64> {
-        let mut bins = vec![0.0; cells * cells];
         let spacing = 2.0 * self.half_width / f64::from(samples);
-        let share = self.sun * spacing * spacing;
-        let place = |index: u32| (f64::from(index) + 0.5) * spacing - self.half_width;
-        for row in 0..samples {
-            for column in 0..samples {
-                let (landed, entered) = self.land(DVec2::new(place(column), place(row)));
-                let cell = (landed + half) * (cells as f64 / (2.0 * half));
-                if cell.min_element() >= 0.0 && cell.max_element() < cells as f64 {
-                    bins[cell.y as usize * cells + cell.x as usize] += share * entered;
+        let share = 0.5 * self.sun * spacing * spacing;
+        let place = |index: u32| f64::from(index) * spacing - self.half_width;
+        let land = |column: u32, row: u32| {
+            let (landed, entered) = self.land(DVec2::new(place(column), place(row)));
+            ((landed + half) * (cells as f64 / (2.0 * half)), entered)
+        };
+        let line = |row: u32| (0..=samples).map(|column| land(column, row)).collect();
+        let mut sum = PixelSum::new(cells);
+        let mut before: Vec<(DVec2, f64)> = line(0);
+        for row in 1..=samples {
+            let after: Vec<(DVec2, f64)> = line(row);
+            for (low, high) in before.windows(2).zip(after.windows(2)) {
+                for corners in [[low[0], low[1], high[1]], [low[0], high[1], high[0]]] {
+                    let entered = corners.map(|(_, entered)| entered).iter().sum::<f64>() / 3.0;
+                    sum.add_triangle(corners.map(|(landed, _)| landed), share * entered);
                 }
             }
+            before = after;
         }
-        bins
+        sum.into_flux()
     }
 
     /// The arrangement, for the tracer, with the surface cut into `cells` squares each way.
@@ -188,13 +202,13 @@ mod tests {
     #[test]
     fn inversion_and_binning_agree_where_nothing_folds() {
         let water = WavyWater::with_strength(1.0);
-        let (half, cells) = (0.5, 4);
+        let (half, cells) = (0.5, 16);
         let bins = water.binned_flux(half, cells, 1000);
         for (index, binned) in bins.iter().enumerate() {
             let cell = DVec2::new((index % cells) as f64, (index / cells) as f64);
-            let min = 0.25 * cell - half;
-            let exact = water.flux(min, min + 0.25);
-            assert!((binned / exact - 1.0).abs() < 3e-3, "{binned} and {exact}");
+            let min = cell / 16.0 - half;
+            let exact = water.flux(min, min + 1.0 / 16.0);
+            assert!((binned / exact - 1.0).abs() < 1e-4, "{binned} and {exact}");
         }
     }
 

@@ -17,7 +17,7 @@ fn footprint_count() -> u32 {
 
 // Whether a footprint may light a pixel of a tile.
 fn may_light(index: u32, place: SplatPlace, tile: vec2<u32>) -> bool {
-    if place.shape == SHAPE_ELLIPSE || place.shape == SHAPE_INTEGRAL {
+    if place.shape == SHAPE_ELLIPSE || place.shape >= SHAPE_INTEGRAL {
         return true;
     }
     let its = surrounding_of_tile(place.level, tile);

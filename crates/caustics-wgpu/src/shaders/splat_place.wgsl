@@ -2,12 +2,14 @@
 // CPU twin: `Splat::span` of caustics-render's `prepared_splat.rs`.
 
 // What lies in a footprint: all pixels of its box; those of its ellipse; those of its ellipse in
-// tiles that show nothing but its receiver in its plane, and all in others; or what a normal
-// distribution over pixels reaches.
+// tiles that show nothing but its receiver in its plane, and all in others; what a normal
+// distribution over pixels reaches; or all pixels of the box of such a distribution, because some
+// see what lies off the footprint's plane.
 const SHAPE_BOX: u32 = 0u;
 const SHAPE_ELLIPSE: u32 = 1u;
 const SHAPE_BY_TILE: u32 = 2u;
 const SHAPE_INTEGRAL: u32 = 3u;
+const SHAPE_SHIFTED: u32 = 4u;
 
 // 40 bytes.
 struct SplatPlace {
@@ -47,6 +49,26 @@ fn integral_of(place: SplatPlace) -> PixelGaussian {
     let step_x = place.step_x;
     let step_y = place.step_y;
     return PixelGaussian(place.center, step_x.x, step_x.y, step_y.x, step_y.y);
+}
+
+// The part of its flux that a pixel gets from a footprint that is integrated over pixels, by what the
+// pixel sees. What a receiver that curves shows beyond the plane is the pixel's square moved to where
+// its light meets the plane. CPU twin: `Splat::shift`.
+fn integral_weight(
+    stored: StoredDensity,
+    place: SplatPlace,
+    plane: vec3<f32>,
+    position: vec3<f32>,
+    normal: vec3<f32>,
+    is_own: bool,
+    pixel: vec2<f32>,
+) -> f32 {
+    var corner = pixel;
+    if place.shape == SHAPE_SHIFTED && is_own && dot(normal, plane) >= MIN_NORMAL_COSINE {
+        // Pixels a metre, in the place of a gradient that is not asked for.
+        corner -= dot(position - stored.center, plane) * stored.u_gradient.xy;
+    }
+    return pixel_gaussian_weight(integral_of(place), corner);
 }
 
 fn range_of(packed: u32) -> vec2<u32> {

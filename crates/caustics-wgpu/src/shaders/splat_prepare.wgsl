@@ -18,6 +18,9 @@ const OVERLAP_INTEGRATED_SIGMA: f32 = 0.35;
 const LEAST_REACH: f32 = 0.75;
 // Half the widest rectangle of pixels that a footprint is integrated over.
 const INTEGRATED_EXTENT: f32 = 48.0;
+// The farthest, in pixels, that light may slide on its way to a footprint's plane for a pixel to be in
+// the plane.
+const NEGLIGIBLE_SHIFT: f32 = 1e-3;
 // The least cosine between the view and the normal of a footprint at which its blur serves for what
 // stands before its plane, too.
 const LEAST_FACING: f32 = 0.3;
@@ -304,8 +307,17 @@ fn prepare(index: u32, count: u32) -> f32 {
             let g = integral_of(place);
             let middle = select(g.center.yx, g.center, g.strips < 0.0);
             let extent = pixel_gaussian_extent(g);
+            var box = Bounds(middle - extent, middle + extent, true);
+            let shift = pixels_per_height(d);
+            let lower = reached.heights.x * shift;
+            let upper = reached.heights.y * shift;
+            if max(length(lower), length(upper)) > NEGLIGIBLE_SHIFT && abs(shift.x) < 1e30 {
+                place.shape = SHAPE_SHIFTED;
+                d.u_gradient = vec3<f32>(shift, 0.0);
+                box.low += min(min(lower, upper), vec2<f32>(0.0));
+                box.high += max(max(lower, upper), vec2<f32>(0.0));
+            }
             // Without the blur it may end before the picture begins.
-            let box = Bounds(middle - extent, middle + extent, true);
             if is_outside(box) {
                 atomicAdd(&counts.outside, 1u);
                 return peak;
@@ -317,7 +329,7 @@ fn prepare(index: u32, count: u32) -> f32 {
             d.strength *= normalisation(place, d.truncation);
         }
     }
-    let half_pixel = 0.5 / pixels_per_height(d);
+    let half_pixel = 0.5 / length(pixels_per_height(d));
     let is_plain = reached.is_own && reached.heights.x >= -half_pixel && reached.heights.y <= half_pixel;
     if is_linear && is_plain && overlaps(record.object) && FOOTPRINT_KERNEL == KERNEL_GAUSSIAN {
         choose_level(&place, sigma, OVERLAP_LEVEL_SIGMA);

@@ -112,21 +112,18 @@ fn share_of(corner: Corner) -> vec3<f32> {
     let position = bitcast<vec3<f32>>(texel.xyz);
     let object = textureLoad(objects, vec2<i32>(corner.position.xy), 0).x;
     let is_own = view.has_objects == 0u || object == object_of(stored.object);
-    let cosine = density_cosine(
-        stored,
-        decode_octahedral(stored.normal),
-        stored_incoming(stored),
-        position,
-        decode_octahedral(texel.w),
-        is_own,
-    );
+    let plane = decode_octahedral(stored.normal);
+    let normal = decode_octahedral(texel.w);
+    let incoming = stored_incoming(stored);
+    let cosine = density_cosine(stored, plane, incoming, position, normal, is_own);
     if cosine == 0.0 {
         return vec3<f32>(0.0);
     }
     let place = places[corner.index];
     var weight = cosine;
-    if place.shape == SHAPE_INTEGRAL {
-        let part = pixel_gaussian_weight(integral_of(place), floor(corner.position.xy));
+    if place.shape >= SHAPE_INTEGRAL {
+        let pixel = floor(corner.position.xy);
+        let part = integral_weight(stored, place, plane, position, normal, is_own, pixel);
         weight *= kernel_peak(view.truncation) * part;
     } else {
         weight *= density_kernel(stored, position, view.truncation);

@@ -41,13 +41,13 @@ fn in_reach(d: Density, gate: Gate, object: u32, bounds: Bounds) -> InReach {
 }
 
 // How far, in pixels, what lies a metre before a footprint's plane is seen from where its light
-// meets the plane.
-fn pixels_per_height(d: Density) -> f32 {
+// meets the plane; 1e30 where that cannot be seen.
+fn pixels_per_height(d: Density) -> vec2<f32> {
     let height = 0.1 * density_radius(d);
     let start = project(d.center);
     let shifted = project(d.center + height * towards_light(d.incoming, d.normal));
     if start.z > 0.0 && shifted.z > 0.0 {
-        return distance(start.xy, shifted.xy) / height;
+        return (shifted.xy - start.xy) / height;
     }
-    return 1e30;
+    return vec2<f32>(1e30);
 }

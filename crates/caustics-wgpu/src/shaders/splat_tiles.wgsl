@@ -96,8 +96,9 @@ fn weight_at(
     if cosine == 0.0 {
         return 0.0;
     }
-    if place.shape == SHAPE_INTEGRAL {
-        let part = pixel_gaussian_weight(integral_of(place), vec2<f32>(pixel));
+    if place.shape >= SHAPE_INTEGRAL {
+        let part =
+            integral_weight(stored, place, plane, position, normal, is_own, vec2<f32>(pixel));
         return cosine * kernel_peak(view.truncation) * part;
     }
     return cosine * density_kernel(stored, position, view.truncation);

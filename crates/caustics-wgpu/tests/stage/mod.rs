@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use caustics_filter::Image;
 use caustics_gpu_readback::{read_buffer, read_texture, uploaded_buffer, uploaded_texture};
 use caustics_render::{FootprintOptions, GBuffer, splat};
-use caustics_scene::{BvhOptions, Camera, SceneIntersector, Surface, World, gltf};
+use caustics_scene::{BvhOptions, Camera, Scene, SceneIntersector, Surface, World, gltf};
 use caustics_trace::{Photon, TraceOptions, trace_photons};
 use caustics_wgpu::glam::Vec3;
 use caustics_wgpu::{
@@ -89,8 +89,12 @@ impl Stage {
         ]
         .iter()
         .collect();
-        let scene = gltf::load_path(path)?.scene;
-        let world = World::new(&scene)?;
+        Self::of(&gltf::load_path(path)?.scene, photons)
+    }
+
+    /// A scene with a camera.
+    pub(crate) fn of(scene: &Scene, photons: u32) -> Result<Self, TestError> {
+        let world = World::new(scene)?;
         let rays = world.intersector(&BvhOptions::default())?;
         let options = TraceOptions {
             photons,
