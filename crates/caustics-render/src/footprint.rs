@@ -13,7 +13,7 @@ use crate::truncated_kernel::TruncatedKernel;
 const MIN_INCIDENCE: f32 = 0.05;
 
 /// The least cosine between the normals of a footprint and of a point that it may light.
-const MIN_NORMAL_COSINE: f32 = 0.5;
+pub(crate) const MIN_NORMAL_COSINE: f32 = 0.5;
 
 /// How far off its plane a footprint lights, relative to its reach.
 const PLANE_DISTANCE: f32 = 0.3;

@@ -123,7 +123,8 @@ impl PixelIntegral {
         })
     }
 
-    /// The pixels that may see what it lights between two heights before its plane, in metres.
+    /// The pixels that may see what it lights of a curved receiver between two heights before its plane,
+    /// in metres.
     fn bounds(&mut self, heights: [f32; 2]) -> Bounds {
         let center = self.gaussian.middle();
         let extent = self.gaussian.extent();
@@ -293,7 +294,12 @@ impl Splat {
             });
         }
         if let Some(integral) = &mut splat.integral {
-            let bounds = integral.bounds(in_reach.heights);
+            let is_curved = surroundings.is_curved(photon.object);
+            let bounds = integral.bounds(if is_curved {
+                in_reach.heights
+            } else {
+                [0.0; 2]
+            });
             splat.place(&bounds, screen);
             return Prepared::Splat(splat);
         }
