@@ -29,7 +29,7 @@ const CURVED_FOUND: &str = "\n\
     On ripples of curvature 30 the error of footprints that are followed is a fifth of the plain planes'\n\
     and less from 2^12 on, and a fiftieth at 2^12; with 2^10, footprints are as long as ripples. On what\n\
     hardly curves, 3 for ripples and 1 under the lens, it makes a few percent of difference. Under the\n\
-    lens at 3 plain planes have 5 to 40 % less. Likely causes, not told apart: each footprint follows\n\
+    lens at 3 plain planes have 5 to 50 % less. Likely causes, not told apart: each footprint follows\n\
     its own photon, as though its light were parallel, because nothing is known of how it converges; and\n\
     in the bowl the light ends where it grazes the slope, at 80 degrees, which stretches the blur of its\n\
     edge.\n\n\
