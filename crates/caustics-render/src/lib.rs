@@ -91,6 +91,7 @@ mod direct;
 mod error;
 mod estimate;
 mod eye;
+mod flat_objects;
 mod footprint;
 mod footprint_gather;
 mod footprint_kernel;

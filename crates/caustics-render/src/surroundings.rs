@@ -1,6 +1,7 @@
 use glam::{Vec2, Vec3};
 
-use crate::footprint::{Density, Gate, MIN_NORMAL_COSINE};
+use crate::flat_objects::curved_objects;
+use crate::footprint::{Density, Gate};
 use crate::gbuffer::{GBuffer, Texel};
 
 /// Pixels along the sides of the smallest tiles.
@@ -17,9 +18,6 @@ pub(crate) struct Surroundings {
     /// For each object up to the last that curves, whether it does.
     curved: Vec<bool>,
 }
-
-/// The least difference between the unit normals of texels side by side where their object curves.
-const CURVED: f32 = 1e-4;
 
 #[derive(Clone, Debug)]
 struct Tiles {
@@ -114,30 +112,6 @@ impl InReach {
     }
 }
 
-/// Which objects have texels side by side whose normals differ, but not by a corner.
-fn curved_objects(buffer: &GBuffer) -> Vec<bool> {
-    let width = buffer.width() as usize;
-    let mut curved = Vec::new();
-    for (pixel, texel) in buffer.texels.iter().enumerate() {
-        let beside = (pixel % width + 1 < width).then_some(pixel + 1);
-        for other in [beside, Some(pixel + width)].into_iter().flatten() {
-            let (Some(texel), Some(Some(other))) = (texel, buffer.texels.get(other)) else {
-                continue;
-            };
-            let difference = texel.normal.distance_squared(other.normal);
-            if texel.object == other.object
-                && difference > CURVED * CURVED
-                && texel.normal.dot(other.normal) >= MIN_NORMAL_COSINE
-            {
-                let object = texel.object as usize;
-                curved.resize(curved.len().max(object + 1), false);
-                curved[object] = true;
-            }
-        }
-    }
-    curved
-}
-
 impl Surroundings {
     pub(crate) fn of(buffer: &GBuffer) -> Self {
         let [width, height] = [buffer.width(), buffer.height()].map(|size| size as usize);
@@ -165,8 +139,8 @@ impl Surroundings {
         }
     }
 
-    /// Whether an object is seen to curve: whether what is in the plane of one of its footprints may
-    /// leave it elsewhere other than by a corner.
+    /// Whether an object is seen beside the plane of one of its footprints, where light that follows
+    /// the surface must be followed to that plane.
     pub(crate) fn is_curved(&self, object: u32) -> bool {
         self.curved.get(object as usize).copied().unwrap_or(false)
     }
