@@ -233,7 +233,7 @@ fn chart(series: &[Series]) -> String {
     const HEIGHT: f64 = 440.0;
     const FRAME: [f64; 4] = [64.0, 20.0, 440.0, 390.0];
     /// Decades of the error.
-    const DECADES: [i32; 2] = [-7, 1];
+    const DECADES: [i32; 2] = [-8, 1];
     let [left, top, right, bottom] = FRAME;
     let x = |power: f64| {
         let part = (power - f64::from(COUNTS[0])) / f64::from(COUNTS[1] - COUNTS[0]);
