@@ -90,6 +90,10 @@ pub(crate) struct PixelIntegral {
     shift: Vec2,
     /// Whether what it lights lies in its plane, as far as pixels can tell.
     pub(crate) is_flat: bool,
+    /// In its plane, in square metres, without the pixel's blur.
+    covariance: Covariance,
+    /// Its flux over the incident cosine.
+    flux: Vec3,
 }
 
 impl PixelIntegral {
@@ -108,11 +112,12 @@ impl PixelIntegral {
         let (tangent, bitangent) = photon.normal.any_orthonormal_pair();
         let on_plane = |axis: Vec3| Vec2::new(axis.dot(tangent), axis.dot(bitangent));
         let to_pixels = Mat2::from_cols(on_plane(pixel[0]), on_plane(pixel[1])).inverse();
-        let covariance =
-            Covariance::of_axes(&photon.axes, photon.normal, options).mapped(&to_pixels);
-        let (short, _) = covariance.eigenvalues();
-        let gaussian = PixelGaussian::new(center, &covariance);
-        let strength = photon.flux * (to_pixels.determinant().abs() / incident_cosine(photon));
+        let covariance = Covariance::of_axes(&photon.axes, photon.normal, options);
+        let on_screen = covariance.mapped(&to_pixels);
+        let (short, _) = on_screen.eigenvalues();
+        let gaussian = PixelGaussian::new(center, &on_screen);
+        let flux = photon.flux / incident_cosine(photon);
+        let strength = flux * to_pixels.determinant().abs();
         let limit = integrated_sigma(photon.coverage, kernel);
         let is_small = short < limit * limit && gaussian.extent().max_element() < INTEGRATED_EXTENT;
         (is_small && strength.is_finite()).then_some(Self {
@@ -120,6 +125,8 @@ impl PixelIntegral {
             strength,
             shift,
             is_flat: true,
+            covariance,
+            flux,
         })
     }
 
@@ -294,7 +301,7 @@ impl Splat {
             });
         }
         if let Some(integral) = &mut splat.integral {
-            let is_curved = surroundings.is_curved(photon.object);
+            let is_curved = surroundings.is_curved(photon.object) || !in_reach.is_flat(half_pixel);
             let bounds = integral.bounds(if is_curved {
                 in_reach.heights
             } else {
@@ -454,6 +461,52 @@ impl Splat {
         } else {
             shift
         }
+    }
+
+    /// Whether a texel catches the light of an integrated footprint on its way to the plane.
+    #[inline]
+    pub(crate) fn is_caught(&self, integral: &PixelIntegral, texel: &Texel) -> bool {
+        let density = &self.density;
+        let normal_cosine = texel.normal.dot(density.normal);
+        !integral.is_flat
+            && (texel.object != density.object && normal_cosine < 0.999
+                || normal_cosine < self.gate.normal_cosine)
+    }
+
+    pub(crate) fn caught(
+        &self,
+        integral: &PixelIntegral,
+        texel: &Texel,
+        pixel: [usize; 2],
+        screen: &Screen,
+        weights: &mut Vec<f32>,
+    ) -> Vec3 {
+        if !self.admits(texel) {
+            return Vec3::ZERO;
+        }
+        let density = &self.density;
+        let Some(edges) = screen.pixel_axes(texel.position, texel.normal) else {
+            return Vec3::ZERO;
+        };
+        let Some(at) = screen.project(texel.position) else {
+            return Vec3::ZERO;
+        };
+        let (tangent, bitangent) = density.normal.any_orthonormal_pair();
+        let up = density.towards_light();
+        let slid = |way: Vec3| {
+            let way = way - way.dot(density.normal) * up;
+            Vec2::new(way.dot(tangent), way.dot(bitangent))
+        };
+        let [x, y] = edges.map(slid);
+        let to_pixels = Mat2::from_cols(x, y).inverse();
+        let center = at + to_pixels * slid(density.center - texel.position);
+        if !center.is_finite() {
+            return Vec3::ZERO;
+        }
+        let gaussian = PixelGaussian::new(center, &integral.covariance.mapped(&to_pixels));
+        let weight = gaussian.part(pixel[0], pixel[1], texel.samples, weights);
+        let cosine = (-texel.normal.dot(density.incoming)).max(0.0);
+        integral.flux * (to_pixels.determinant().abs() * cosine * weight / texel.coverage)
     }
 
     fn admits(&self, texel: &Texel) -> bool {

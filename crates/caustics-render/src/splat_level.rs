@@ -9,6 +9,7 @@ use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
 use crate::pixel_samples::PixelSamples;
 use crate::prepared_splat::{PixelIntegral, Prepared, STRIDE, Splat};
+use crate::screen::Screen;
 use crate::surroundings::{Relation, Surroundings, TILE};
 
 /// Rows of one task.
@@ -219,6 +220,7 @@ impl<'a> Level<'a> {
                 width: self.width,
                 depth: self.depth,
                 surroundings,
+                screen: &self.buffer.screen,
                 reflection: &self.reflection,
                 texels: &self.texels,
                 columns: &self.columns,
@@ -336,6 +338,7 @@ struct BandTask<'a> {
     width: usize,
     depth: u32,
     surroundings: &'a Surroundings,
+    screen: &'a Screen,
     reflection: &'a Reflection,
     texels: &'a [Option<Texel>],
     columns: &'a TexelColumns,
@@ -405,6 +408,7 @@ impl BandTask<'_> {
         gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
             if let Some(texel) = &texels[row * width + column]
                 && splat.shift(integral, texel) == Vec2::ZERO
+                && !splat.is_caught(integral, texel)
             {
                 let target = (row - first) * width + column;
                 let weight = if texel.samples == PixelSamples::ALL {
@@ -423,6 +427,12 @@ impl BandTask<'_> {
                 let Some(texel) = &texels[row * width + column] else {
                     continue;
                 };
+                if splat.is_caught(integral, texel) {
+                    let target = (row - first) * width + column;
+                    let caught = splat.caught(integral, texel, [column, row], self.screen, weights);
+                    light.add(target, caught);
+                    continue;
+                }
                 let shift = splat.shift(integral, texel);
                 if shift != Vec2::ZERO {
                     let moved = gaussian.moved(shift);
@@ -439,7 +449,10 @@ impl BandTask<'_> {
         for index in begin(rows.start)..begin(rows.end) {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
-            if columns.contains(&column) {
+            if columns.contains(&column) && splat.is_caught(integral, texel) {
+                self.extra_light[index] +=
+                    splat.caught(integral, texel, [column, row], self.screen, weights);
+            } else if columns.contains(&column) {
                 let moved = gaussian.moved(splat.shift(integral, texel));
                 let weight = moved.part(column, row, texel.samples, weights);
                 if weight > 0.0 {
