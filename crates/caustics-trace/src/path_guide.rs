@@ -1,5 +1,10 @@
 use std::collections::HashMap;
 
+use glam::Vec3;
+
+/// Set in the hash of a path whose light landed turned over. It is clear on the way.
+const TURNED: u32 = 0x8000_0000;
+
 /// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
 /// whole words).
 pub(crate) fn extended(path: u32, object: u32, event: u32) -> u32 {
@@ -7,7 +12,20 @@ pub(crate) fn extended(path: u32, object: u32, event: u32) -> u32 {
         .wrapping_mul(4)
         .wrapping_add(event)
         .wrapping_add(0x9E37_79B9);
-    (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
+    (path.rotate_left(5) ^ word).wrapping_mul(0x0100_0193) & !TURNED
+}
+
+/// The hash of a path that landed, by the axes of its footprint on a receiver with `normal`.
+///
+/// Where light that one path brings folds over, at a caustic, it lands on both sides of the fold as two
+/// sheets that lie on each other, one of them turned over: the determinant of the map from the light to
+/// the receiver changes its sign. Both end at the fold.
+pub(crate) fn landed(path: u32, axes: &[Vec3; 2], normal: Vec3) -> u32 {
+    if axes[0].cross(axes[1]).dot(normal) < 0.0 {
+        path | TURNED
+    } else {
+        path
+    }
 }
 
 /// Keeps a photon's branches to those of one path, once that path is known.
@@ -29,10 +47,10 @@ impl PathGuide {
         self.followed.clear();
     }
 
-    /// Follows one path only, if it has been seen.
+    /// Follows one path only, if it has been seen, wherever it lands.
     pub(crate) fn follow(&mut self, path: u32) -> bool {
         self.followed.clear();
-        let mut next = path;
+        let mut next = path & !TURNED;
         // A path is not longer than all that were seen; with equal hashes it might lead in a circle.
         for _ in 0..=self.before.len() {
             let Some(&before) = self.before.get(&next) else {
