@@ -4,6 +4,9 @@ use crate::world::World;
 use caustics_geometry::{Hit, NormalGradient, Ray, SpawnPoint, Sphere, Triangle, interpolate};
 use glam::Vec3;
 
+/// Steps of a normal's coordinates by which flat faces are told apart.
+const FACE_STEPS: f32 = 512.0;
+
 /// A point on a surface of a [`World`], and what a tracer wants to know there.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
@@ -116,6 +119,26 @@ impl World {
     }
 
     /// The vertex normals weighted by barycentric coordinates, not of unit length.
+    /// Which of the ways that the flat faces of its object look a point's face looks: a number that is the
+    /// same for all triangles of a plane, whose vertices all have that plane's normal, and 0 for what
+    /// curves.
+    #[must_use]
+    pub fn flat_face(&self, point: &SurfacePoint) -> u32 {
+        match self.triangle_normals(point.primitive) {
+            Some([a, b, c]) if a == b && a == c => {
+                // Coarsely: coplanar triangles may have normals that differ by rounding.
+                let steps = (FACE_STEPS * a + 0.5).floor().as_ivec3();
+                let word = |word: u32, step: i32| {
+                    (word ^ step as u32)
+                        .wrapping_mul(0x0100_0193)
+                        .rotate_left(9)
+                };
+                1 | [steps.x, steps.y, steps.z].into_iter().fold(0, word)
+            }
+            _ => 0,
+        }
+    }
+
     fn interpolated_normal(&self, primitive: u32, u: f32, v: f32) -> Option<Vec3> {
         let normal = interpolate(self.triangle_normals(primitive)?, u, v);
         // Where opposite normals cancel, what is left is rounding.

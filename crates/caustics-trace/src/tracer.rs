@@ -338,7 +338,9 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         if strongest <= 0.0 {
             return;
         }
-        let path = extended(branch.path, point.object, 1 + outgoing.event as u32);
+        // A flat face's light is a sheet of its own.
+        let face = point.object ^ self.world.flat_face(point);
+        let path = extended(branch.path, face, 1 + outgoing.event as u32);
         if !self.admits(path, branch.path) {
             return;
         }

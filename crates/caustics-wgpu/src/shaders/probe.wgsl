@@ -13,8 +13,8 @@ var<private> sought_turns: u32;
 var<private> probed: FootprintRecord;
 var<private> is_probed: bool;
 
-fn store_photon(record: FootprintRecord, branch: Branch) -> bool {
-    if branch.path == sought_path && !is_probed {
+fn store_photon(record: FootprintRecord, branch: Branch, path: u32) -> bool {
+    if path == sought_path && !is_probed {
         probed = record;
         is_probed = true;
     }

@@ -56,6 +56,28 @@ fn interpolated_normal(triangle: u32, u: f32, v: f32) -> vec3<f32> {
     return select(vec3(0.0), normal, dot(normal, normal) > 1e-8);
 }
 
+// Steps of a normal's coordinates by which flat faces are told apart.
+const FACE_STEPS: f32 = 512.0;
+
+// Twin: `World::flat_face`.
+fn flat_face(point: SurfacePoint) -> u32 {
+    if (point.primitive & SPHERE_BIT) != 0u {
+        return 0u;
+    }
+    let corners = triangles[point.primitive];
+    let normal = vertex_normal(corners.a);
+    if any(normal != vertex_normal(corners.b)) || any(normal != vertex_normal(corners.c)) {
+        return 0u;
+    }
+    let steps = vec3<i32>(floor(rounded_vector(FACE_STEPS * normal) + 0.5));
+    var word = 0u;
+    for (var i = 0u; i < 3u; i++) {
+        word = (word ^ u32(steps[i])) * 0x01000193u;
+        word = (word << 9u) | (word >> 23u);
+    }
+    return word | 1u;
+}
+
 fn surface_at(ray: Ray, hit: Hit) -> SurfacePoint {
     var point: SurfacePoint;
     point.primitive = hit.primitive;

@@ -10,7 +10,7 @@ const WORKGROUP_SIZE: u32 = 64u;
 var<private> last_record: u32;
 
 // Whether there was room.
-fn store_photon(record: FootprintRecord, branch: Branch) -> bool {
+fn store_photon(record: FootprintRecord, branch: Branch, path: u32) -> bool {
     let place = atomicAdd(&counters[COUNTER_STORED], 1u);
     if place >= arrayLength(&appended) {
         // No count below the room is ever seen, since every such step back follows one ahead.
@@ -21,7 +21,7 @@ fn store_photon(record: FootprintRecord, branch: Branch) -> bool {
     appended[place] = record;
     let link = link_of(trace.first_link, place + 1u);
     links[link] = last_record | select(0u, LINK_THINNED, branch.is_thinned);
-    links[link + 1u] = branch.path;
+    links[link + 1u] = path;
     links[link + 2u] = with_channel(branch.turns, branch.channel);
     last_record = place + 1u;
     return true;
