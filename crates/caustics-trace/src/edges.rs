@@ -28,7 +28,7 @@ const SIGNIFICANT: f32 = 0.1;
 
 /// The last photons of a lattice's rows, divided.
 ///
-/// A sheet of light, the photons of one path, ends somewhere between the last point of a row that has
+/// A sheet of light, the photons of one path that landed the same side up, ends somewhere between the last point of a row that has
 /// it and the next, which has not. Nobody knows where, so that as many cells' light is drawn as there
 /// are points, with a jagged edge; and where the sheet ends at a silhouette, Fresnel's terms and the
 /// place of landing change within that last cell as much as over many others. Both are found by a few

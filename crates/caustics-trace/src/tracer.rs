@@ -48,8 +48,8 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     /// Branches of the photon that is being traced.
     pub(crate) pending: Vec<Branch<N>>,
     pub(crate) photons: Vec<Photon>,
-    /// For each photon, a hash of what its path met and did there: photons of one path are parts of
-    /// one smooth sheet of light.
+    /// For each photon, a hash of what its path met and did there, and of whether its light landed turned
+    /// over: photons of one path are parts of one smooth sheet of light.
     pub(crate) paths: Vec<u32>,
     pub(crate) ledger: EnergyLedger,
     /// What the photons are aimed at; `None` where all count.
