@@ -102,7 +102,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             let is_worth_it = photon.source != FootprintSource::Thinned
                 && flux(photon) >= SIGNIFICANT * brightest;
             let path = lattice.paths[index];
-            let landed = neighbours.map(|pair| pair.map(|at| lattice.photon_of(at?, path)));
+            let landed = lattice.landed(index, &neighbours);
             let number = lattice.lattice.number(point);
             if is_worth_it && self.divide(photon, number, path, &landed, checked) {
                 self.ledger.divided_photons += 1;

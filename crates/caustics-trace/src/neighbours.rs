@@ -3,6 +3,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::lattice::Lattice;
+use crate::path_guide::{signed_area, turned_over};
 use crate::photon::{FootprintSource, Photon};
 use crate::silhouette::Silhouette;
 
@@ -40,6 +41,25 @@ const LONGER: f32 = 1.15;
 /// one.
 pub(crate) const MAX_RATIO: f32 = 1e3;
 
+/// The largest part of the footprint of the photon before it that the footprint of the last photon
+/// before a smooth fold covers.
+///
+/// Divided like the last photons before other edges, those at smooth folds make less of an error where
+/// cells are wide, a third of it in folded water seen by 2^10 photons, but twice as much from 2^18 on, and
+/// some pixels ten times too bright.
+///
+/// Light that turns round smoothly lands at the square of the distance to the fold, in cells: where the
+/// last photon stands `k` before it, with `k` below 1, their areas are as `k` and `k + 1`. Where a surface
+/// has a kink light turns round at full speed.
+const SLOWING: f32 = 0.6;
+
+/// Whether the fold beyond a photon, with the photon before it, is smooth: what is nearest to the fold then
+/// has narrow footprints by itself, and the neighbour on the other side is one like all.
+fn folds_smoothly(photon: &Photon, before: &Photon) -> bool {
+    let area = |it: &Photon| signed_area(&it.axes, photon.normal).abs();
+    area(photon) < SLOWING * area(before)
+}
+
 /// The photons of an emitter, in the order of a lattice, with what their paths met.
 pub(crate) struct LatticePhotons<'a> {
     pub(crate) lattice: &'a Lattice,
@@ -60,9 +80,26 @@ impl LatticePhotons<'_> {
             if photon.source == FootprintSource::Thinned {
                 return checked(photon, &[[None; 2]; 2]);
             }
-            let path = self.paths[index];
-            let landed = neighbours.map(|pair| pair.map(|at| self.photon_of(at?, path)));
-            checked(photon, &landed)
+            checked(photon, &self.landed(index, &neighbours))
+        })
+    }
+
+    /// The photons before and after one along each axis, where they are parts of its sheet of light;
+    /// `neighbours` are the numbers of its point's neighbours.
+    pub(crate) fn landed(
+        &self,
+        index: usize,
+        neighbours: &[[Option<u32>; 2]; 2],
+    ) -> [[Option<&Photon>; 2]; 2] {
+        let (photon, path) = (&self.photons[index], self.paths[index]);
+        [0, 1].map(|axis| {
+            let at = neighbours[axis];
+            let beyond = |side: usize| self.photon_of(at[side]?, turned_over(path));
+            match at.map(|at| self.photon_of(at?, path)) {
+                [Some(before), None] if folds_smoothly(photon, before) => [Some(before), beyond(1)],
+                [None, Some(before)] if folds_smoothly(photon, before) => [beyond(0), Some(before)],
+                pair => pair,
+            }
         })
     }
 

@@ -21,11 +21,22 @@ pub(crate) fn extended(path: u32, object: u32, event: u32) -> u32 {
 /// sheets that lie on each other, one of them turned over: the determinant of the map from the light to
 /// the receiver changes its sign. Both end at the fold.
 pub(crate) fn landed(path: u32, axes: &[Vec3; 2], normal: Vec3) -> u32 {
-    if axes[0].cross(axes[1]).dot(normal) < 0.0 {
+    if signed_area(axes, normal) < 0.0 {
         path | TURNED
     } else {
         path
     }
+}
+
+/// The area of the parallelogram of two axes in the plane with unit `normal`; below 0 where it is turned
+/// over.
+pub(crate) fn signed_area(axes: &[Vec3; 2], normal: Vec3) -> f32 {
+    axes[0].cross(axes[1]).dot(normal)
+}
+
+/// The hash of the same path whose light landed the other side up.
+pub(crate) fn turned_over(path: u32) -> u32 {
+    path ^ TURNED
 }
 
 /// Keeps a photon's branches to those of one path, once that path is known.

@@ -28,6 +28,7 @@ const ORDER: Shader = Shader {
         shader_piece!("ledger_lines"),
         shader_piece!("ledger"),
         shader_piece!("photon_links"),
+        shader_piece!("sheet"),
         shader_piece!("neighbours"),
         shader_piece!("photon_beside"),
         shader_piece!("photon_order"),

@@ -124,7 +124,8 @@ fn divide_record(place: u32) {
     photon_number = photon.photon;
     let emitter = emitter_of(photon.photon);
     let point = point_number(emitter, photon.photon - trace.emitters[emitter].first);
-    let landings = landed_beside(neighbours_of(emitter, photon.photon), sought_path);
+    let landings = landed_beside(
+        photon, neighbours_of(emitter, photon.photon), sought_path);
 
     var rows: array<Row, 2>;
     var ends = 0u;

@@ -27,7 +27,7 @@ fn mark_photon(photon: u32) {
         if (before & LINK_THINNED) == 0u
             && (links[link + 2u] & TURN_TOO_MANY) == 0u
             && largest(flux_of(record)) >= SIGNIFICANT * brightest {
-            let landings = landed_beside(beside, links[link + 1u]);
+            let landings = landed_beside(record, beside, links[link + 1u]);
             if is_end(record, landings[0]) || is_end(record, landings[1]) {
                 let index = atomicAdd(&counters[COUNTER_EDGES], 1u);
                 links[trace.first_edge + index] = place;

@@ -17,6 +17,8 @@ struct Landed {
     position: vec3<f32>,
     // Its axis along which it is a neighbour.
     axis: vec3<f32>,
+    // Of its footprint, in the photon's plane.
+    area: f32,
     object: u32,
     is_there: bool,
 }

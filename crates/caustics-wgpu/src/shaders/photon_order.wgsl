@@ -50,7 +50,7 @@ fn order_photon(photon: u32) {
             }
         } else {
             if checks && (before & LINK_THINNED) == 0u {
-                let landings = landed_beside(beside, path);
+                let landings = landed_beside(record, beside, path);
                 let after = checked(record, landings[0], landings[1]);
                 count_up(COUNTER_REPLACED, select(0u, 1u, after.is_replaced));
                 record = after.record;

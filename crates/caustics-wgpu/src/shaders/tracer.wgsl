@@ -40,9 +40,6 @@ var<private> photon_emitter: u32;
 // Whether its ray is one of an earlier emitter's too.
 var<private> photon_covered: bool;
 
-// Set in the hash of a path whose light landed turned over. Twin: path_guide.rs in caustics-trace.
-const TURNED: u32 = 0x80000000u;
-
 fn extended(path: u32, object: u32, event: u32) -> u32 {
     let word = object * 4u + event + 0x9e3779b9u;
     return ((((path << 5u) | (path >> 27u)) ^ word) * 0x01000193u) & ~TURNED;
@@ -50,11 +47,7 @@ fn extended(path: u32, object: u32, event: u32) -> u32 {
 
 // The hash of a path that landed, by where the axes of its footprint lie on a receiver with `normal`.
 fn path_landed(path: u32, axes: array<vec3<f32>, 2>, normal: vec3<f32>) -> u32 {
-    let u = axes[0];
-    let v = axes[1];
-    let across = rounded_vector(u.yzx * v.zxy) - rounded_vector(v.yzx * u.zxy);
-    let parts = rounded_vector(across * normal);
-    return path | select(0u, TURNED, parts.x + parts.y + parts.z < 0.0);
+    return path | select(0u, TURNED, signed_area(axes[0], axes[1], normal) < 0.0);
 }
 
 // Stores light that has landed, and says what became of it.
