@@ -94,6 +94,7 @@ mod eye;
 mod flat_objects;
 mod footprint;
 mod footprint_gather;
+mod footprint_integral;
 mod footprint_kernel;
 mod footprint_piece;
 mod gbuffer;

@@ -1,12 +1,11 @@
 use caustics_trace::{Coverage, Photon};
-use glam::{Mat2, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use std::ops::Range;
 
-use crate::covariance::Covariance;
-use crate::footprint::{Density, FootprintOptions, Gate, incident_cosine};
+use crate::footprint::{Density, FootprintOptions, Gate};
+use crate::footprint_integral::{FootprintIntegral, integrated_sigma};
 use crate::footprint_kernel::FootprintKernel;
 use crate::gbuffer::Texel;
-use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;
 use crate::splat_bounds::Bounds;
 use crate::splat_level::margin;
@@ -29,25 +28,6 @@ const OVERLAP_LEVEL_SIGMA: f32 = 0.8;
 
 /// Footprints with a standard deviation below this many pixels are normalised by their own sum.
 const SMALL_SIGMA: f32 = 0.9;
-
-/// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles;
-/// narrower ones are integrated over the pixels.
-const INTEGRATED_SIGMA: f32 = 0.9;
-
-/// As [`INTEGRATED_SIGMA`], for footprints that overlap: those that are narrower still are lines of
-/// light that would leak into the pixels beside them.
-const OVERLAP_INTEGRATED_SIGMA: f32 = 0.35;
-
-/// Half a pixel's diagonal and a little, in pixels: no farther is the nearest pixel's middle.
-const LEAST_REACH: f32 = 0.75;
-
-/// Half the widest rectangle of pixels that a footprint is integrated over, beyond which the
-/// perspective bends it.
-const INTEGRATED_EXTENT: f32 = 48.0;
-
-/// The farthest, in pixels, that light may slide on its way to a footprint's plane for a pixel to be in
-/// the plane.
-const NEGLIGIBLE_SHIFT: f32 = 1e-3;
 
 /// The least cosine between the view and the normal of a footprint at which its blur serves for what
 /// stands before its plane, too. A plane that is seen edge-on blurs its footprints by a pixel that is
@@ -76,89 +56,7 @@ pub(crate) struct Splat {
     pub(crate) columns: [u16; 2],
     pub(crate) rows: [u16; 2],
     /// Instead of all this, where it is as small as pixels.
-    pub(crate) integral: Option<PixelIntegral>,
-}
-
-/// A footprint that is integrated over pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PixelIntegral {
-    pub(crate) gaussian: PixelGaussian,
-    /// What a pixel with all of the flux would have for irradiance, over the incident cosine.
-    pub(crate) strength: Vec3,
-    /// How far, in pixels, what lies a metre before the plane is seen from where its light meets the
-    /// plane.
-    shift: Vec2,
-    /// Whether what it lights lies in its plane, as far as pixels can tell.
-    pub(crate) is_flat: bool,
-    /// In its plane, in square metres, without the pixel's blur.
-    covariance: Covariance,
-    /// Its flux over the incident cosine.
-    flux: Vec3,
-}
-
-impl PixelIntegral {
-    /// `None` for a footprint that can be read at the pixels' middles.
-    fn of(
-        photon: &Photon,
-        pixel: &[Vec3; 2],
-        center: Vec2,
-        shift: Vec2,
-        options: &FootprintOptions,
-        kernel: TruncatedKernel,
-    ) -> Option<Self> {
-        if kernel.shape != FootprintKernel::Gaussian || !options.integrate_pixels {
-            return None;
-        }
-        let (tangent, bitangent) = photon.normal.any_orthonormal_pair();
-        let on_plane = |axis: Vec3| Vec2::new(axis.dot(tangent), axis.dot(bitangent));
-        let to_pixels = Mat2::from_cols(on_plane(pixel[0]), on_plane(pixel[1])).inverse();
-        let covariance = Covariance::of_axes(&photon.axes, photon.normal, options);
-        let on_screen = covariance.mapped(&to_pixels);
-        let (short, _) = on_screen.eigenvalues();
-        let gaussian = PixelGaussian::new(center, &on_screen);
-        let flux = photon.flux / incident_cosine(photon);
-        let strength = flux * to_pixels.determinant().abs();
-        let limit = integrated_sigma(photon.coverage, kernel);
-        let is_small = short < limit * limit && gaussian.extent().max_element() < INTEGRATED_EXTENT;
-        (is_small && strength.is_finite()).then_some(Self {
-            gaussian,
-            strength,
-            shift,
-            is_flat: true,
-            covariance,
-            flux,
-        })
-    }
-
-    /// The pixels that may see what it lights of a curved receiver between two heights before its plane,
-    /// in metres.
-    fn bounds(&mut self, heights: [f32; 2]) -> Bounds {
-        let center = self.gaussian.middle();
-        let extent = self.gaussian.extent();
-        let [one, other] = heights.map(|height| height * self.shift);
-        self.is_flat = one.length().max(other.length()) <= NEGLIGIBLE_SHIFT;
-        let (mut low, mut high) = (center - extent, center + extent);
-        if !self.is_flat {
-            low += one.min(other).min(Vec2::ZERO);
-            high += one.max(other).max(Vec2::ZERO);
-        }
-        Bounds {
-            low,
-            high,
-            is_exact: true,
-        }
-    }
-}
-
-/// The least standard deviation of a footprint, in pixels, that is read at the pixels' middles. It
-/// reaches one of them from wherever it stands.
-fn integrated_sigma(coverage: Coverage, kernel: TruncatedKernel) -> f32 {
-    let reaching = LEAST_REACH / kernel.reach();
-    let least = reaching * reaching - kernel.shape.pixel_variance();
-    match coverage {
-        Coverage::Overlap => OVERLAP_INTEGRATED_SIGMA.max(least.max(0.0).sqrt()),
-        _ => INTEGRATED_SIGMA,
-    }
+    pub(crate) integral: Option<FootprintIntegral>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -297,12 +195,13 @@ impl Splat {
         if splat.is_linear && sigma * sigma < blurred && !surroundings.is_glossy {
             let shift = shift.unwrap_or_default();
             splat.integral = pixel.and_then(|pixel| {
-                PixelIntegral::of(photon, &pixel, center, shift, options, kernel)
+                FootprintIntegral::of(photon, &pixel, center, shift, options, kernel)
             });
         }
         if let Some(integral) = &mut splat.integral {
-            let is_curved = surroundings.is_curved(photon.object) || !in_reach.is_flat(half_pixel);
-            let bounds = integral.bounds(if is_curved {
+            // A receiver that curves, or what stands before one that does not.
+            let is_beside = surroundings.is_curved(photon.object) || !in_reach.is_flat(half_pixel);
+            let bounds = integral.bounds(if is_beside {
                 in_reach.heights
             } else {
                 [0.0; 2]
@@ -434,95 +333,13 @@ impl Splat {
         low..high
     }
 
-    /// What the photon adds to the irradiance of a texel whose pixel gets `weight` of its flux.
-    #[inline]
-    pub(crate) fn integrated(&self, integral: &PixelIntegral, texel: &Texel, weight: f32) -> Vec3 {
-        if self.admits(texel) {
-            let cosine = (-texel.normal.dot(self.density.incoming)).max(0.0);
-            integral.strength * (cosine * weight)
-        } else {
-            Vec3::ZERO
-        }
-    }
-
-    /// How far, in pixels, what a pixel sees is from where its light meets the footprint's plane, where
-    /// the receiver curves; zero in the plane, and on what catches the light before it.
-    #[inline]
-    pub(crate) fn shift(&self, integral: &PixelIntegral, texel: &Texel) -> Vec2 {
-        let density = &self.density;
-        let normal_cosine = texel.normal.dot(density.normal);
-        let curves = texel.object == density.object && normal_cosine >= self.gate.normal_cosine;
-        if integral.is_flat || !curves {
-            return Vec2::ZERO;
-        }
-        let shift = (texel.position - density.center).dot(density.normal) * integral.shift;
-        if shift.length_squared() <= NEGLIGIBLE_SHIFT * NEGLIGIBLE_SHIFT {
-            Vec2::ZERO
-        } else {
-            shift
-        }
-    }
-
-    /// Whether a texel catches the light of an integrated footprint on its way to the plane.
-    #[inline]
-    pub(crate) fn is_caught(&self, integral: &PixelIntegral, texel: &Texel) -> bool {
-        let density = &self.density;
-        let normal_cosine = texel.normal.dot(density.normal);
-        !integral.is_flat
-            && (texel.object != density.object && normal_cosine < 0.999
-                || normal_cosine < self.gate.normal_cosine)
-    }
-
-    pub(crate) fn caught(
-        &self,
-        integral: &PixelIntegral,
-        texel: &Texel,
-        pixel: [usize; 2],
-        screen: &Screen,
-        weights: &mut Vec<f32>,
-    ) -> Vec3 {
-        if !self.admits(texel) {
-            return Vec3::ZERO;
-        }
-        let density = &self.density;
-        let Some(edges) = screen.pixel_axes(texel.position, texel.normal) else {
-            return Vec3::ZERO;
-        };
-        let Some(at) = screen.project(texel.position) else {
-            return Vec3::ZERO;
-        };
-        let (tangent, bitangent) = density.normal.any_orthonormal_pair();
-        let up = density.towards_light();
-        let slid = |way: Vec3| {
-            let way = way - way.dot(density.normal) * up;
-            Vec2::new(way.dot(tangent), way.dot(bitangent))
-        };
-        let [x, y] = edges.map(slid);
-        let to_pixels = Mat2::from_cols(x, y).inverse();
-        let center = at + to_pixels * slid(density.center - texel.position);
-        if !center.is_finite() {
-            return Vec3::ZERO;
-        }
-        let gaussian = PixelGaussian::new(center, &integral.covariance.mapped(&to_pixels));
-        let weight = gaussian.part(pixel[0], pixel[1], texel.samples, weights);
-        let cosine = (-texel.normal.dot(density.incoming)).max(0.0);
-        integral.flux * (to_pixels.determinant().abs() * cosine * weight / texel.coverage)
-    }
-
-    fn admits(&self, texel: &Texel) -> bool {
-        self.gate.admits(
-            &self.density,
-            texel.position,
-            texel.normal,
-            Some(texel.object),
-        )
-    }
-
     /// What the photon adds to the irradiance of a texel.
     #[inline]
     pub(crate) fn irradiance(&self, texel: &Texel) -> Vec3 {
-        if self.admits(texel) {
-            self.density.irradiance(texel.position, texel.normal)
+        let object = Some(texel.object);
+        let (density, normal) = (&self.density, texel.normal);
+        if self.gate.admits(density, texel.position, normal, object) {
+            density.irradiance(texel.position, normal)
         } else {
             Vec3::ZERO
         }

@@ -5,10 +5,11 @@ use glam::{Vec2, Vec3};
 use std::ops::Range;
 
 use crate::columns::{Columns, ColumnsMut, TexelColumns};
+use crate::footprint_integral::FootprintIntegral;
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
 use crate::pixel_samples::PixelSamples;
-use crate::prepared_splat::{PixelIntegral, Prepared, STRIDE, Splat};
+use crate::prepared_splat::{Prepared, STRIDE, Splat};
 use crate::screen::Screen;
 use crate::surroundings::{Relation, Surroundings, TILE};
 
@@ -394,7 +395,7 @@ impl BandTask<'_> {
     fn light_integrated(
         &mut self,
         splat: &Splat,
-        integral: &PixelIntegral,
+        integral: &FootprintIntegral,
         rows: Range<usize>,
         [weights, part_weights]: &mut [Vec<f32>; 2],
     ) {
@@ -404,11 +405,11 @@ impl BandTask<'_> {
         }
         let (texels, light) = (self.texels, &mut self.light);
         let (width, first) = (self.width, self.first_row);
-        let gaussian = &integral.gaussian;
+        let (density, gate) = (&splat.density, &splat.gate);
+        let gaussian = integral.gaussian();
         gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
             if let Some(texel) = &texels[row * width + column]
-                && splat.shift(integral, texel) == Vec2::ZERO
-                && !splat.is_caught(integral, texel)
+                && integral.is_in_plane(density, gate, texel)
             {
                 let target = (row - first) * width + column;
                 let weight = if texel.samples == PixelSamples::ALL {
@@ -416,29 +417,26 @@ impl BandTask<'_> {
                 } else {
                     gaussian.part(column, row, texel.samples, part_weights) / texel.coverage
                 };
-                light.add(target, splat.integrated(integral, texel, weight));
+                let irradiance = integral.irradiance_in_plane(density, gate, texel, weight);
+                light.add(target, irradiance);
             }
         });
-        // What a curved receiver shows off the plane is the pixel's square moved to where its light
-        // meets the plane.
-        let off_plane = if integral.is_flat { 0..0 } else { rows.clone() };
+        let mut at = |texel: &Texel, pixel: [usize; 2]| {
+            integral.irradiance(density, gate, texel, pixel, self.screen, weights)
+        };
+        // Off the plane each pixel lies elsewhere in the distribution.
+        let off_plane = if integral.is_flat() {
+            0..0
+        } else {
+            rows.clone()
+        };
         for row in off_plane {
             for column in columns.clone() {
-                let Some(texel) = &texels[row * width + column] else {
-                    continue;
-                };
-                if splat.is_caught(integral, texel) {
+                if let Some(texel) = &texels[row * width + column]
+                    && !integral.is_in_plane(density, gate, texel)
+                {
                     let target = (row - first) * width + column;
-                    let caught = splat.caught(integral, texel, [column, row], self.screen, weights);
-                    light.add(target, caught);
-                    continue;
-                }
-                let shift = splat.shift(integral, texel);
-                if shift != Vec2::ZERO {
-                    let moved = gaussian.moved(shift);
-                    let weight = moved.part(column, row, texel.samples, weights) / texel.coverage;
-                    let target = (row - first) * width + column;
-                    light.add(target, splat.integrated(integral, texel, weight));
+                    light.add(target, at(texel, [column, row]));
                 }
             }
         }
@@ -449,16 +447,8 @@ impl BandTask<'_> {
         for index in begin(rows.start)..begin(rows.end) {
             let (pixel, texel) = &self.extras[index];
             let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
-            if columns.contains(&column) && splat.is_caught(integral, texel) {
-                self.extra_light[index] +=
-                    splat.caught(integral, texel, [column, row], self.screen, weights);
-            } else if columns.contains(&column) {
-                let moved = gaussian.moved(splat.shift(integral, texel));
-                let weight = moved.part(column, row, texel.samples, weights);
-                if weight > 0.0 {
-                    self.extra_light[index] +=
-                        splat.integrated(integral, texel, weight / texel.coverage);
-                }
+            if columns.contains(&column) {
+                self.extra_light[index] += at(texel, [column, row]);
             }
         }
     }

@@ -33,6 +33,8 @@ const QUADS: Shader = Shader {
         shader_piece!("splat_view"),
         shader_piece!("pixel_integral"),
         shader_piece!("splat_place"),
+        shader_piece!("screen"),
+        shader_piece!("splat_integral"),
         shader_piece!("splat_scale"),
         shader_piece!("splat_sample"),
         shader_piece!("splat_rounding"),

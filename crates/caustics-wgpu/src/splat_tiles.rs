@@ -31,6 +31,8 @@ const TILES: Shader = Shader {
         shader_piece!("pixel_integral"),
         shader_piece!("surroundings"),
         shader_piece!("splat_place"),
+        shader_piece!("screen"),
+        shader_piece!("splat_integral"),
         shader_piece!("splat_tiles"),
     ],
 };

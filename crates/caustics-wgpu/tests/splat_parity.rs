@@ -4,8 +4,8 @@ mod stage;
 
 use caustics_geometry::shapes;
 use caustics_render::{FootprintKernel, FootprintOptions};
-use caustics_scene::{Camera, Instance, Light, Material, Scene, Shape};
-use caustics_trace::Photon;
+use caustics_scene::{BvhOptions, Camera, Instance, Light, Material, Scene, Shape, World};
+use caustics_trace::{Coverage, FootprintSource, Photon};
 use caustics_wgpu::glam::{Vec2, Vec3};
 use caustics_wgpu::{RendererOptions, SplatKernel, SplatMethod, SplatOptions, wgpu};
 use stage::{Stage, TestError, device_with, differences, irradiance};
@@ -185,6 +185,99 @@ fn curved_receivers_are_followed_as_on_the_cpu() -> Result<(), TestError> {
         let (plain, _) = run(&stage.photons.iter().map(straight).collect::<Vec<_>>())?;
         println!("plain planes: off by {plain:.2e}");
         assert!(plain > 2.0 * OFF, "{plain}");
+    }
+    Ok(())
+}
+
+/// A floor and a wall, each in small footprints of light that falls steeply along the wall, seen so low
+/// that the pixels at the corner would have the light of either on the other.
+fn corner() -> Result<Stage, TestError> {
+    const STEP: f32 = 0.008;
+    let mut scene = Scene::new();
+    let chalk = scene.add_material(Material::diffuse("chalk", [1.0; 3]))?;
+    let across = 8.0 * Vec3::NEG_Z;
+    for (start, along, across) in [
+        (Vec3::new(-4.0, 0.0, 4.0), 4.0 * Vec3::X, across),
+        (Vec3::new(0.0, 0.0, 4.0), across, 4.0 * Vec3::Y),
+    ] {
+        let mesh = scene.add_mesh(shapes::quad(start, along, across)?);
+        scene.add_instance(Instance::new("side", Shape::Mesh(mesh), chalk))?;
+    }
+    let eye = [-3.0, 1.3, 0.7];
+    scene.add_camera(Camera::look_at("low", eye, [0.0; 3], Vec3::Y, 0.3)?)?;
+    let world = World::new(&scene)?;
+    let rays = world.intersector(&BvhOptions::default())?;
+    let (sine, cosine) = 0.3f32.sin_cos();
+    let one = |column: i32, row: i32| {
+        // Off the ray through the corner. Before it, the floor is lit, behind it the wall.
+        let off = (column as f32 + 0.37) * STEP;
+        let z = (row as f32 + 0.5) * STEP;
+        let (position, normal, along, object) = if off < 0.0 {
+            let position = Vec3::new(off / cosine, 0.0, z);
+            (position, Vec3::Y, STEP / cosine * Vec3::X, 0)
+        } else {
+            let position = Vec3::new(0.0, off / sine, z);
+            (position, Vec3::NEG_X, STEP / sine * Vec3::Y, 1)
+        };
+        Photon {
+            position,
+            incoming: Vec3::new(sine, -cosine, 0.0),
+            flux: Vec3::splat(STEP * STEP),
+            normal,
+            axes: [along, STEP * Vec3::Z],
+            object,
+            events: 1,
+            source: FootprintSource::Differential,
+            coverage: Coverage::Cell,
+        }
+    };
+    let photons = (-40..40).flat_map(|row| (-40..40).map(move |column| one(column, row)));
+    Ok(Stage {
+        photons: photons.collect(),
+        camera: scene.cameras().first().ok_or("no camera")?.clone(),
+        world,
+        rays,
+    })
+}
+
+#[test]
+fn light_is_followed_to_what_catches_it_as_on_the_cpu() -> Result<(), TestError> {
+    let quads = SplatOptions {
+        method: SplatMethod::Quads,
+        ..SplatOptions::default()
+    };
+    let mut stage = corner()?;
+    let picture = stage.picture(&stage.camera, SIZE);
+    // One whose light the wall catches in one pixel. The floor's pixels are larger: there is more in
+    // this one than any of those would have, which is what sums are bounded by.
+    let pixel = (SIZE[0] * (SIZE[1] / 2 - 2) + SIZE[0] / 2) as usize;
+    let lit = picture.seen[pixel].ok_or("nothing is seen")?;
+    assert!(lit.object == 1 && !picture.is_edge[pixel]);
+    let one = stage.photons[0];
+    let alone = Photon {
+        position: lit.position - lit.position.y / one.incoming.y * one.incoming,
+        axes: [1e-3 * Vec3::X, 1e-3 * Vec3::Z],
+        ..one
+    };
+    let all = std::mem::take(&mut stage.photons);
+    for photons in [all, vec![alone]] {
+        stage.photons = photons;
+        let expected = stage.splat(&picture, &FootprintOptions::default())?;
+        for (features, splat, tolerance) in [
+            (wgpu::Features::empty(), SplatOptions::default(), OFF),
+            (wgpu::Features::FLOAT32_BLENDABLE, quads, OFF),
+            (wgpu::Features::empty(), quads, OFF_IN_HALF_FLOATS),
+        ] {
+            let Some((device, queue)) = device_with(features) else {
+                return Ok(());
+            };
+            let photons = [&stage.photons[..]];
+            let (found, stats) = irradiance(&device, &queue, &with(splat), &picture, &photons)?;
+            let (off, wrong) = differences(&picture, &picture.radiance(&found), &expected);
+            println!("corner: off by {off:.2e}, {wrong:.2e} of the pixels, {stats:?}");
+            assert_eq!(stats.splatted + stats.outside, photons[0].len() as u32);
+            assert!(off < tolerance, "{off}, {wrong} of the pixels, {stats:?}");
+        }
     }
     Ok(())
 }

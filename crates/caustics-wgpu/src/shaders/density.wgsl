@@ -187,6 +187,13 @@ fn covariance_add(c: Covariance, weight: f32, x: f32, y: f32) -> Covariance {
     return c + weight * vec3<f32>(x * x, x * y, y * y);
 }
 
+// What a linear map makes of it, given by the rows of its matrix.
+fn covariance_mapped(c: Covariance, to_x: vec2<f32>, to_y: vec2<f32>) -> Covariance {
+    let by_x = vec2<f32>(c.x * to_x.x + c.y * to_x.y, c.y * to_x.x + c.z * to_x.y);
+    let by_y = vec2<f32>(c.x * to_y.x + c.y * to_y.y, c.y * to_y.x + c.z * to_y.y);
+    return vec3<f32>(dot(to_x, by_x), dot(to_x, by_y), dot(to_y, by_y));
+}
+
 // The shorter and the longer variance.
 fn covariance_eigenvalues(c: Covariance) -> vec2<f32> {
     let mean = 0.5 * (c.x + c.z);

@@ -58,6 +58,16 @@ fn pixel_gaussian(center: vec2<f32>, c: Covariance) -> PixelGaussian {
     return g;
 }
 
+// What it was made of, in squares of pixels.
+fn pixel_gaussian_covariance(g: PixelGaussian) -> Covariance {
+    let long = g.long * g.long;
+    let cross = g.slope * long;
+    // Without what the strip's own extent added.
+    let strip = g.slope * min(1.0 / abs(g.strips), 2.0 * INTEGRAL_CUT * g.long);
+    let short = max(g.short * g.short - strip * strip / 12.0, 0.0) + g.slope * cross;
+    return select(vec3<f32>(short, cross, long), vec3<f32>(long, cross, short), g.strips < 0.0);
+}
+
 // Half the sides of the rectangle that holds it, in pixels.
 fn pixel_gaussian_extent(g: PixelGaussian) -> vec2<f32> {
     let along = INTEGRAL_CUT * g.long;

@@ -21,18 +21,21 @@ fn project(point: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(vec2<f32>(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * vec2<f32>(view.size), clip.w);
 }
 
+// How many pixels a way makes from a point whose homogeneous place on the screen is `clip`.
+fn pixels_along(clip: vec4<f32>, way: vec3<f32>) -> vec2<f32> {
+    let along = view.view_projection * vec4<f32>(way, 0.0);
+    let half_size = vec2<f32>(0.5, -0.5) * vec2<f32>(view.size) / clip.w;
+    return (along.xy - clip.xy / clip.w * along.w) * half_size;
+}
+
 // How the point of a plane that a pixel sees moves with the pixel's two coordinates: the inverse of
 // the projection's derivative in the plane.
 fn pixel_axes(point: vec3<f32>, normal: vec3<f32>) -> PixelAxes {
     let tangent = tangent_of(normal);
     let bitangent = bitangent_of(normal);
     let clip = view.view_projection * vec4<f32>(point, 1.0);
-    let ndc = clip.xy / clip.w;
-    let half_size = vec2<f32>(0.5, -0.5) * vec2<f32>(view.size) / clip.w;
-    let along_t = view.view_projection * vec4<f32>(tangent, 0.0);
-    let along_b = view.view_projection * vec4<f32>(bitangent, 0.0);
-    let t = (along_t.xy - ndc * along_t.w) * half_size;
-    let b = (along_b.xy - ndc * along_b.w) * half_size;
+    let t = pixels_along(clip, tangent);
+    let b = pixels_along(clip, bitangent);
     let determinant = t.x * b.y - t.y * b.x;
     var axes: PixelAxes;
     axes.x = (b.y * tangent - t.y * bitangent) / determinant;

@@ -11,6 +11,11 @@ const SHAPE_BY_TILE: u32 = 2u;
 const SHAPE_INTEGRAL: u32 = 3u;
 const SHAPE_SHIFTED: u32 = 4u;
 
+// By how much the strength of such a box is multiplied. A plane that is seen aslant shows a footprint on
+// fewer pixels than a surface before it that faces the view, and each of these may hold all of the flux:
+// as bright as the peak that the sums are bounded by.
+const CAUGHT_PEAK: f32 = 4.0;
+
 // 40 bytes.
 struct SplatPlace {
     // Middle, in pixels of the level.
@@ -49,26 +54,6 @@ fn integral_of(place: SplatPlace) -> PixelGaussian {
     let step_x = place.step_x;
     let step_y = place.step_y;
     return PixelGaussian(place.center, step_x.x, step_x.y, step_y.x, step_y.y);
-}
-
-// The part of its flux that a pixel gets from a footprint that is integrated over pixels, by what the
-// pixel sees. What a receiver that curves shows beyond the plane is the pixel's square moved to where
-// its light meets the plane. CPU twin: `Splat::shift`.
-fn integral_weight(
-    stored: StoredDensity,
-    place: SplatPlace,
-    plane: vec3<f32>,
-    position: vec3<f32>,
-    normal: vec3<f32>,
-    is_own: bool,
-    pixel: vec2<f32>,
-) -> f32 {
-    var corner = pixel;
-    if place.shape == SHAPE_SHIFTED && is_own && dot(normal, plane) >= MIN_NORMAL_COSINE {
-        // Pixels a metre, in the place of a gradient that is not asked for.
-        corner -= dot(position - stored.center, plane) * stored.u_gradient.xy;
-    }
-    return pixel_gaussian_weight(integral_of(place), corner);
 }
 
 fn range_of(packed: u32) -> vec2<u32> {

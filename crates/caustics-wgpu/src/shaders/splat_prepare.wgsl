@@ -26,6 +26,8 @@ const NEGLIGIBLE_SHIFT: f32 = 1e-3;
 const LEAST_FACING: f32 = 0.3;
 
 const_assert DENSITY_OVERLAP_BIT == OVERLAP_BIT;
+// So much larger are the pixels of a plane than those of what faces the view before it.
+const_assert CAUGHT_PEAK * LEAST_FACING > 1.0;
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<storage, read> footprints: array<FootprintRecord>;
@@ -189,7 +191,7 @@ fn prepare_before_plane(record: FootprintRecord, count: u32) -> f32 {
 }
 
 // Whether a footprint is integrated over pixels; then its place and its strength are made so.
-// CPU twin: `PixelIntegral::of`.
+// CPU twin: `FootprintIntegral::of`.
 fn is_integrated(
     record: FootprintRecord,
     axes: PixelAxes,
@@ -207,10 +209,7 @@ fn is_integrated(
     // The inverse of the matrix with columns x and y: rows of it.
     let to_x = vec2<f32>(y.y, -y.x) / area;
     let to_y = vec2<f32>(-x.y, x.x) / area;
-    let c = covariance_of(record);
-    let by_x = vec2<f32>(c.x * to_x.x + c.y * to_x.y, c.y * to_x.x + c.z * to_x.y);
-    let by_y = vec2<f32>(c.x * to_y.x + c.y * to_y.y, c.y * to_y.x + c.z * to_y.y);
-    let mapped = vec3<f32>(dot(to_x, by_x), dot(to_x, by_y), dot(to_y, by_y));
+    let mapped = covariance_mapped(covariance_of(record), to_x, to_y);
     let g = pixel_gaussian((*place).center, mapped);
     let extent = pixel_gaussian_extent(g);
     let cosine = max(-dot(record.incoming, record.normal), MIN_INCIDENCE);
@@ -314,6 +313,7 @@ fn prepare(index: u32, count: u32) -> f32 {
             if max(length(lower), length(upper)) > NEGLIGIBLE_SHIFT && abs(shift.x) < 1e30 {
                 place.shape = SHAPE_SHIFTED;
                 d.u_gradient = vec3<f32>(shift, 0.0);
+                d.strength *= CAUGHT_PEAK;
                 box.low += min(min(lower, upper), vec2<f32>(0.0));
                 box.high += max(max(lower, upper), vec2<f32>(0.0));
             }

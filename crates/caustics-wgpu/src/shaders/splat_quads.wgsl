@@ -120,13 +120,14 @@ fn share_of(corner: Corner) -> vec3<f32> {
         return vec3<f32>(0.0);
     }
     let place = places[corner.index];
-    var weight = cosine;
+    var weight = 0.0;
     if place.shape >= SHAPE_INTEGRAL {
         let pixel = floor(corner.position.xy);
-        let part = integral_weight(stored, place, plane, position, normal, is_own, pixel);
-        weight *= kernel_peak(view.truncation) * part;
+        weight = kernel_peak(view.truncation) * integral_weight(
+            stored, place, plane, incoming, position, normal, is_own, cosine, pixel,
+        );
     } else {
-        weight *= density_kernel(stored, position, view.truncation);
+        weight = cosine * density_kernel(stored, position, view.truncation);
     }
     return splat_scale.scale * weight * stored.strength;
 }

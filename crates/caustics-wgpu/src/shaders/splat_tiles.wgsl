@@ -97,9 +97,9 @@ fn weight_at(
         return 0.0;
     }
     if place.shape >= SHAPE_INTEGRAL {
-        let part =
-            integral_weight(stored, place, plane, position, normal, is_own, vec2<f32>(pixel));
-        return cosine * kernel_peak(view.truncation) * part;
+        return kernel_peak(view.truncation) * integral_weight(
+            stored, place, plane, incoming, position, normal, is_own, cosine, vec2<f32>(pixel),
+        );
     }
     return cosine * density_kernel(stored, position, view.truncation);
 }
