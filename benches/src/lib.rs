@@ -3,6 +3,7 @@
 pub mod chart;
 pub mod command;
 pub mod conditions;
+pub mod counted;
 pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
@@ -11,6 +12,7 @@ pub mod gpu;
 pub mod meshes;
 #[cfg(feature = "nanoflann-cpp")]
 pub mod nanoflann_cpp;
+pub mod noise;
 pub mod peers;
 pub mod photons;
 pub mod random;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::noise::Estimated;
 use crate::stage::Failure;
 
 /// One measured picture: how long it took and how far it is from the reference.
@@ -35,6 +36,9 @@ pub struct Row {
     pub relative_mse: f64,
     /// The same without the 1 % of pixels where it is largest.
     pub relative_mse_trimmed: f64,
+    /// What of the relative mean squared error is not noise of the reference, where that was told
+    /// apart.
+    pub noise_free: Option<Estimated>,
     /// 99.9th percentile of a pixel's error over the reference's mean.
     pub p999_relative: f64,
     /// LDR-FLIP, where Python could be asked for it.
@@ -58,7 +62,7 @@ pub struct Conditions {
 
 const HEADER: &str = "scene,estimate,setting,photons,stored,trace_seconds,trace_runs,\
 estimate_seconds,estimate_runs,look_seconds,load_seconds,energy_ratio,relmse,relmse_trim1,\
-p999_rel,flip_ldr,threads,machine,date,commit";
+relmse_noise_free,relmse_noise_free_se,p999_rel,flip_ldr,threads,machine,date,commit";
 
 impl Row {
     /// Trace and estimate together, in seconds.
@@ -85,8 +89,12 @@ impl Row {
         let flip = self
             .flip
             .map_or_else(String::new, |flip| format!("{flip:.5}"));
+        let noise_free = self.noise_free.map_or_else(
+            || ",".to_owned(),
+            |it| format!("{:.6e},{:.3e}", it.value, it.standard_error),
+        );
         format!(
-            "{},{},{},{},{},{:.5},{},{:.5},{},{:.5},{:.5},{:.5},{:.6e},{:.6e},{:.6e},{flip},\
+            "{},{},{},{},{},{:.5},{},{:.5},{},{:.5},{:.5},{:.5},{:.6e},{:.6e},{noise_free},{:.6e},{flip},\
              {threads},{machine},{date},{commit}",
             self.scene,
             self.estimate,
@@ -132,17 +140,23 @@ impl Row {
             energy_ratio: number(11)?,
             relative_mse: number(12)?,
             relative_mse_trimmed: number(13)?,
-            p999_relative: number(14)?,
-            flip: if fields[15].is_empty() {
-                None
-            } else {
-                Some(number(15)?)
+            noise_free: match (fields[14], fields[15]) {
+                ("", "") => None,
+                _ => Some(Estimated {
+                    value: number(14)?,
+                    standard_error: number(15)?,
+                }),
+            },
+            p999_relative: number(16)?,
+            flip: match fields[17] {
+                "" => None,
+                _ => Some(number(17)?),
             },
             conditions: Conditions {
-                threads: number(16)? as usize,
-                machine: fields[17].to_owned(),
-                date: fields[18].to_owned(),
-                commit: fields[19].to_owned(),
+                threads: number(18)? as usize,
+                machine: fields[19].to_owned(),
+                date: fields[20].to_owned(),
+                commit: fields[21].to_owned(),
             },
         })
     }
@@ -247,6 +261,7 @@ mod tests {
             energy_ratio: 1.0,
             relative_mse: 0.0625,
             relative_mse_trimmed: 0.03125,
+            noise_free: None,
             p999_relative: 2.0,
             flip: None,
             conditions: Conditions {
@@ -266,6 +281,14 @@ mod tests {
                 flip: Some(0.5),
                 ..row()
             },
+            Row {
+                // Chance may take more from a small error than there is.
+                noise_free: Some(Estimated {
+                    value: -0.0625,
+                    standard_error: 0.125,
+                }),
+                ..row()
+            },
         ];
         assert_eq!(from_csv(&to_csv(&rows)).unwrap(), rows);
     }
@@ -276,6 +299,9 @@ mod tests {
         assert!(from_csv(&text.replace("65536", "many")).is_err());
         assert!(from_csv(&text.replace(",nearest", "")).is_err());
         assert!(from_csv("peer,scene\n").is_err());
+        // A value wants its standard error.
+        assert!(text.contains(",3.125000e-2,,,"));
+        assert!(from_csv(&text.replace(",3.125000e-2,,,", ",3.125000e-2,1,,")).is_err());
         assert!(peers_from_csv("peer,scene,setting,seconds,relmse\n").is_err());
     }
 

@@ -14,6 +14,8 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --photons N,N        photons emitted (default: 65536,262144,2000000)
   --ladder N,N         further counts, for the default estimate alone
                        (default: 1024,4096,16384,1048576,4194304; `none` for none)
+  --counted N          photons of the picture that tells a reference's noise from errors, not timed
+                       (default: 32000000; 0 for none)
   --runs N             runs that a median is taken of, at most (default: 5)
   --patience S         seconds after which no further run starts (default: 3)
   --threads N          threads (default: as many as there are cores)
@@ -23,6 +25,7 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --document FILE      Markdown whose marked tables are rewritten (default: docs/accuracy.md)
   --svg FOLDER         folder of the charts (default: docs)
   --images FOLDER      keeps the pictures as EXR
+  --noise-csv FILE     the references' noise (default: benches/data/noise.csv)
   --peers FILE         other renderers' rows (default: benches/data/peers.csv)
   --measure no         measures nothing, rewrites tables and charts from the CSV
   --full yes           measures caustics seen through glass and in mirrors, too, on the scenes that
@@ -36,6 +39,7 @@ pub(crate) struct Arguments {
     pub(crate) estimates: Vec<Estimate>,
     pub(crate) photons: Vec<u32>,
     pub(crate) ladder: Vec<u32>,
+    pub(crate) counted: u32,
     pub(crate) patience: Patience,
     pub(crate) threads: Option<usize>,
     pub(crate) machine: String,
@@ -44,6 +48,7 @@ pub(crate) struct Arguments {
     pub(crate) svg: PathBuf,
     pub(crate) images: Option<PathBuf>,
     pub(crate) peers: PathBuf,
+    pub(crate) noise_csv: PathBuf,
     pub(crate) measures: bool,
     pub(crate) measures_full: bool,
     pub(crate) full_csv: PathBuf,
@@ -57,6 +62,7 @@ impl Arguments {
             estimates: Estimate::ALL.to_vec(),
             photons: vec![65_536, 262_144, 2_000_000],
             ladder: vec![1024, 4096, 16_384, 1_048_576, 4_194_304],
+            counted: 32_000_000,
             patience: Patience {
                 runs: 5,
                 seconds: 3.0,
@@ -68,6 +74,7 @@ impl Arguments {
             svg: root.join("docs"),
             images: None,
             peers: root.join("benches/data/peers.csv"),
+            noise_csv: root.join("benches/data/noise.csv"),
             measures: true,
             measures_full: false,
             full_csv: root.join("benches/data/full.csv"),
@@ -108,6 +115,7 @@ impl Arguments {
             }
             "--photons" => self.photons = counts(value)?,
             "--ladder" => self.ladder = counts(value)?,
+            "--counted" => self.counted = value.parse()?,
             "--runs" => self.patience.runs = value.parse()?,
             "--patience" => self.patience.seconds = value.parse()?,
             "--threads" => self.threads = Some(value.parse()?),
@@ -117,6 +125,7 @@ impl Arguments {
             "--svg" => self.svg = value.into(),
             "--images" => self.images = Some(value.into()),
             "--peers" => self.peers = value.into(),
+            "--noise-csv" => self.noise_csv = value.into(),
             "--full" => self.measures_full = value != "no",
             "--full-csv" => self.full_csv = value.into(),
             "--measure" => self.measures = value != "no",

@@ -102,6 +102,7 @@ fn measure(
                 energy_ratio: comparison.energy_ratio,
                 relative_mse: comparison.relative_mse,
                 relative_mse_trimmed: comparison.relative_mse_trimmed,
+                noise_free: None,
                 p999_relative: comparison.p999_relative,
                 flip: None,
                 conditions: conditions.clone(),

@@ -5,9 +5,11 @@
 mod arguments;
 mod chart;
 mod full;
+mod gain;
 mod measure;
 mod metric;
 mod nearest_search;
+mod noise;
 mod tables;
 
 use std::fs;
@@ -15,6 +17,7 @@ use std::process::ExitCode;
 
 use caustics_benches::command::exit_code;
 use caustics_benches::conditions::conditions;
+use caustics_benches::counted::Counted;
 use caustics_benches::document::rewrite;
 use caustics_benches::score::{Row, from_csv, peers_from_csv, to_csv};
 use caustics_benches::stage::{Failure, Stage};
@@ -43,10 +46,18 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let conditions = conditions(&arguments.machine);
     let full = full::rows(arguments, &conditions)?;
+    let mut noises = noise::rows(arguments)?;
     if arguments.measures {
         for name in &arguments.scenes {
             let stage = Stage::load(name)?;
-            let measured = measure::measure(&stage, arguments, &conditions)?;
+            let counted = match arguments.counted {
+                0 => None,
+                photons => Some(Counted::new(&stage, photons)?),
+            };
+            if let Some(counted) = &counted {
+                noise::measure(&mut noises, &stage, counted, arguments, &conditions)?;
+            }
+            let measured = measure::measure(&stage, counted.as_ref(), arguments, &conditions)?;
             replace(&mut rows, measured);
             // After every scene, so that little is lost when the program is stopped.
             fs::write(&arguments.csv, to_csv(&rows))?;
@@ -61,6 +72,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut all = tables::all(&rows, &peers);
     all.push(("full", full::table(&full)));
+    all.push(("noise", noise::table(&noises, &rows)));
     rewrite(&arguments.document, &all)
 }
 

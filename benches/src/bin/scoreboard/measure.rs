@@ -6,7 +6,9 @@ use caustics::CausticsOptions;
 use caustics::filter::{Comparison, Image, write_exr};
 use caustics::render::{Estimate, GBuffer, splat};
 use caustics::trace::{PhotonMap, TraceOptions, trace_photons};
+use caustics_benches::counted::Counted;
 use caustics_benches::flip::Flip;
+use caustics_benches::noise::{FLOOR, error_without_noise};
 use caustics_benches::receivers::{Receiver, receivers};
 use caustics_benches::score::{Conditions, Row};
 use caustics_benches::stage::{Failure, Stage};
@@ -40,9 +42,11 @@ impl Views {
     }
 }
 
-/// Times and scores the estimates that were asked for on one scene.
+/// Times and scores the estimates that were asked for on one scene; with a counted picture of it,
+/// without the reference's noise, too.
 pub(crate) fn measure(
     stage: &Stage,
+    counted: Option<&Counted>,
     arguments: &Arguments,
     conditions: &Conditions,
 ) -> Result<Vec<Row>, Failure> {
@@ -84,6 +88,9 @@ pub(crate) fn measure(
         if comparison.non_finite > 0 {
             eprintln!("{name}: {} values are not finite", comparison.non_finite);
         }
+        let noise_free = counted
+            .map(|counted| error_without_noise(&image.value, &stage.reference, counted, FLOOR))
+            .transpose()?;
         let row = Row {
             scene: stage.name.clone(),
             estimate: estimate.name().to_owned(),
@@ -99,6 +106,7 @@ pub(crate) fn measure(
             energy_ratio: comparison.energy_ratio,
             relative_mse: comparison.relative_mse,
             relative_mse_trimmed: comparison.relative_mse_trimmed,
+            noise_free,
             p999_relative: comparison.p999_relative,
             flip: None,
             conditions: conditions.clone(),

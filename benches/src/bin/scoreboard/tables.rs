@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use caustics::render::Estimate;
 use caustics_benches::score::{PeerRow, Row};
 
+use crate::gain;
 use crate::metric::Metric;
 
 /// All tables, by the names of their marks.
@@ -13,7 +14,7 @@ pub(crate) fn all(rows: &[Row], peers: &[PeerRow]) -> Vec<(&'static str, String)
     vec![
         ("conditions", conditions(rows)),
         ("baseline", baseline(rows)),
-        ("gain", gain(rows)),
+        ("gain", gain::table(rows)),
         ("winners", winners(rows)),
         ("estimates", estimates(rows)),
         ("peers", peer_table(rows, peers, Metric::RelativeMse)),
@@ -34,7 +35,7 @@ pub(crate) fn figure(value: f64) -> String {
     format!("{value:.*}", (2 - magnitude).max(0) as usize)
 }
 
-fn thousands(count: u64) -> String {
+pub(crate) fn thousands(count: u64) -> String {
     let digits = count.to_string();
     let mut grouped = String::new();
     for (place, digit) in digits.chars().enumerate() {
@@ -50,12 +51,12 @@ fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), figure)
 }
 
-fn scenes(rows: &[Row]) -> BTreeSet<&str> {
+pub(crate) fn scenes(rows: &[Row]) -> BTreeSet<&str> {
     rows.iter().map(|row| row.scene.as_str()).collect()
 }
 
 /// The photon counts at which estimates other than the default were measured too.
-fn common_counts(rows: &[Row]) -> BTreeSet<u32> {
+pub(crate) fn common_counts(rows: &[Row]) -> BTreeSet<u32> {
     rows.iter()
         .filter(|row| row.estimate != Estimate::default().name())
         .map(|row| row.photons)
@@ -119,43 +120,12 @@ fn baseline(rows: &[Row]) -> String {
     text
 }
 
-/// The default estimate against the nearest photons at the same counts.
-fn gain(rows: &[Row]) -> String {
-    let counts = common_counts(rows);
-    let mut text = String::from("| scene |");
-    for count in &counts {
-        let _ = write!(
-            text,
-            " {}: relMSE | trimmed | seconds |",
-            thousands(u64::from(*count))
-        );
-    }
-    text.push_str("\n| --- |");
-    text.push_str(&" ---: | ---: | ---: |".repeat(counts.len()));
-    text.push('\n');
-    for scene in scenes(rows) {
-        let _ = write!(text, "| {scene} |");
-        for &count in &counts {
-            let of = |estimate: Estimate| find(rows, scene, estimate.name(), count);
-            match (of(Estimate::Nearest), of(Estimate::default())) {
-                (Some(base), Some(ours)) => {
-                    for ratio in [
-                        base.relative_mse / ours.relative_mse,
-                        base.relative_mse_trimmed / ours.relative_mse_trimmed,
-                        base.seconds() / ours.seconds(),
-                    ] {
-                        let _ = write!(text, " {} |", figure(ratio));
-                    }
-                }
-                _ => text.push_str(" – | – | – |"),
-            }
-        }
-        text.push('\n');
-    }
-    text
-}
-
-fn find<'a>(rows: &'a [Row], scene: &str, estimate: &str, photons: u32) -> Option<&'a Row> {
+pub(crate) fn find<'a>(
+    rows: &'a [Row],
+    scene: &str,
+    estimate: &str,
+    photons: u32,
+) -> Option<&'a Row> {
     rows.iter()
         .find(|row| row.scene == scene && row.estimate == estimate && row.photons == photons)
 }
