@@ -118,10 +118,9 @@ impl World {
         self.spheres().get(index)
     }
 
-    /// The vertex normals weighted by barycentric coordinates, not of unit length.
-    /// Which of the ways that the flat faces of its object look a point's face looks: a number that is the
-    /// same for all triangles of a plane, whose vertices all have that plane's normal, and 0 for what
-    /// curves.
+    /// A number that tells the flat faces of an object apart: the same for all triangles whose vertices
+    /// have one normal, other for other normals but by rare chance, and 0 for what curves. Parallel faces
+    /// of one object have the same.
     #[must_use]
     pub fn flat_face(&self, point: &SurfacePoint) -> u32 {
         match self.triangle_normals(point.primitive) {
@@ -139,6 +138,7 @@ impl World {
         }
     }
 
+    /// The vertex normals weighted by barycentric coordinates, not of unit length.
     fn interpolated_normal(&self, primitive: u32, u: f32, v: f32) -> Option<Vec3> {
         let normal = interpolate(self.triangle_normals(primitive)?, u, v);
         // Where opposite normals cancel, what is left is rounding.

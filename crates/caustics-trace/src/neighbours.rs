@@ -45,8 +45,8 @@ pub(crate) const MAX_RATIO: f32 = 1e3;
 /// before a smooth fold covers.
 ///
 /// Divided like the last photons before other edges, those at smooth folds make less of an error where
-/// cells are wide, a third of it in folded water seen by 2^10 photons, but twice as much from 2^18 on, and
-/// some pixels ten times too bright.
+/// cells are wide, a third of it in folded water seen by 2^10 photons, but about twice as much from 2^18
+/// on, and behind a ball of glass the largest errors of pixels are several times as large.
 ///
 /// Light that turns round smoothly lands at the square of the distance to the fold, in cells: where the
 /// last photon stands `k` before it, with `k` below 1, their areas are as `k` and `k + 1`. Where a surface

@@ -20,7 +20,7 @@ pub(crate) fn extended(path: u32, object: u32, event: u32) -> u32 {
 /// Where light that one path brings folds over, at a caustic, it lands on both sides of the fold as two
 /// sheets that lie on each other, one of them turned over: the determinant of the map from the light to
 /// the receiver changes its sign. Both end at the fold.
-pub(crate) fn landed(path: u32, axes: &[Vec3; 2], normal: Vec3) -> u32 {
+pub(crate) fn path_landed(path: u32, axes: &[Vec3; 2], normal: Vec3) -> u32 {
     if signed_area(axes, normal) < 0.0 {
         path | TURNED
     } else {

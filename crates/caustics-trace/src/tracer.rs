@@ -11,7 +11,7 @@ use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::optics::beer_lambert;
 use crate::options::{Branching, TraceOptions};
-use crate::path_guide::{PathGuide, extended, landed};
+use crate::path_guide::{PathGuide, extended, path_landed};
 use crate::photon::{FootprintSource, Photon};
 use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
@@ -258,7 +258,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         let side = if point.from_outside { 1.0 } else { -1.0 };
         let (axes, coverage) = branch.differential.footprint(point.geometric_normal);
         let normal = side * point.geometric_normal;
-        self.paths.push(landed(branch.path, &axes, normal));
+        self.paths.push(path_landed(branch.path, &axes, normal));
         self.photons.push(Photon {
             position: point.spawn.position,
             incoming: branch.ray.direction,

@@ -15,7 +15,7 @@ const LAMP: f32 = 2.9;
 /// The ceiling's height.
 const CEILING: f32 = 3.0;
 
-/// A mirror on the ground, of an upper and a lower half, that throws a lamp's light at the ceiling.
+/// A mirror on the ground that throws a lamp's light at the ceiling.
 fn lit(mirror: TriangleMesh) -> Scene {
     let mut scene = Scene::new();
     add_mesh(

@@ -65,7 +65,7 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
         }
     }
     assert_eq!(checked.ledger.replaced_differentials, replaced);
-    // All around the silhouette and where the light folds over, and hardly anywhere else.
+    // All around the silhouette, and hardly anywhere else.
     assert!(replaced > 100, "{replaced}");
     assert!(moved > 100, "{moved}");
     assert!(weighed > 100, "{weighed}");
@@ -74,7 +74,7 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
     let stored = checked.ledger.entry(Fate::Stored).flux;
     assert!(gain.length() < 3e-3 * stored.length(), "{gain} of {stored}");
     assert!(checked.ledger.imbalance() < 1e-6);
-    assert!(verified > 8 * replaced, "{verified} {replaced}");
+    assert!(verified > 10 * replaced, "{verified} {replaced}");
 }
 
 #[test]

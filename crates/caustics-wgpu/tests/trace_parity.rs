@@ -83,8 +83,7 @@ fn other_photons_are_told_apart() {
     // A ledger of fewer photons.
     let ledger = ledger_of(&trails_by_cpu(&stage, &options)[..1_000], &plan);
     assert!(!unlike_lines(&traced.counters.ledger, &ledger, trails.len()).is_empty());
-    // Footprints that are not checked, of a ball, which has a silhouette all around.
-    let stage = Stage::load("p01_sphere.glb");
+    // Footprints that are not checked.
     let options = TraceOptions {
         divide_edges: false,
         ..options
