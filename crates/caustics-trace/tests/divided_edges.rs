@@ -11,6 +11,7 @@ use caustics_trace::{
 };
 
 use common::scenes::{add_floor, add_mesh, ball_over_floor, flattened};
+use common::spill::{CEILING, LAMP, flux, spilt, under_a_lamp};
 
 fn trace(scene: &Scene, options: &TraceOptions) -> PhotonMap {
     let (world, intersector) = flattened(scene);
@@ -31,58 +32,28 @@ fn mirror(roll: f32) -> (Scene, [Vec3; 4]) {
     let [a, b] = HALVES;
     let corners = [corner(-a, b), corner(a, b), corner(a, -b), corner(-a, -b)];
     let mesh = TriangleMesh::with_flat_normals(&corners, &[[0, 1, 2], [0, 2, 3]]);
-    let mut scene = Scene::new();
-    let metal = Material::metal("metal", [0.9; 3]);
-    add_mesh(&mut scene, "mirror", mesh.expect("a valid mirror"), metal);
-    let ceiling =
-        caustics_geometry::shapes::quad(Vec3::new(-9.0, 3.0, -9.0), 18.0 * Vec3::X, 18.0 * Vec3::Z);
-    let white = Material::diffuse("white", [0.8; 3]);
-    add_mesh(
-        &mut scene,
-        "ceiling",
-        ceiling.expect("a valid ceiling"),
-        white,
-    );
-    let lamp = Light::point([0.0, 2.9, 0.0], [10.0; 3]).expect("a valid lamp");
-    scene.add_light(lamp).expect("a valid lamp");
+    let scene = under_a_lamp(mesh.expect("a valid mirror"));
     (scene, corners)
 }
 
-/// The part of all photons' flux that lies outside of the mirror's image, and how much flux there is.
-fn spilt(map: &PhotonMap, corners: &[Vec3; 4]) -> (f64, f64) {
+/// Whether a place at the ceiling lies outside of the mirror's image.
+fn is_outside(at: Vec3, corners: &[Vec3; 4]) -> bool {
     // The lamp's mirror image, from which the light seems to come.
-    let lamp = Vec3::new(0.0, 2.9, 0.0);
     let normal = (corners[1] - corners[0])
         .cross(corners[3] - corners[0])
         .normalize();
-    let image = lamp - 2.0 * (lamp - corners[0]).dot(normal) * normal;
+    let image = LAMP - 2.0 * (LAMP - corners[0]).dot(normal) * normal;
     let projected = corners.map(|corner| {
         let way = corner - image;
-        image + way * ((3.0 - image.y) / way.y)
+        image + way * ((CEILING - image.y) / way.y)
     });
     let middle = 0.25 * projected.iter().sum::<Vec3>();
-    // How far outside of the image's sides a place is, in metres.
-    let outside = |at: Vec3| {
-        (0..4)
-            .map(|side| {
-                let (from, to) = (projected[side], projected[(side + 1) % 4]);
-                let mut outwards = (to - from).cross(Vec3::Y).normalize();
-                outwards *= (from - middle).dot(outwards).signum();
-                (at - from).dot(outwards)
-            })
-            .fold(f32::NEG_INFINITY, f32::max)
-    };
-    let (mut beyond, mut all) = (0.0, 0.0);
-    for photon in &map.photons {
-        let flux = f64::from(photon.flux.x);
-        all += flux;
-        // The corners of what the photon lights, a tenth of a cell inwards.
-        for (u, v) in [(-0.4, -0.4), (-0.4, 0.4), (0.4, -0.4), (0.4, 0.4)] {
-            let at = photon.position + u * photon.axes[0] + v * photon.axes[1];
-            beyond += 0.25 * flux * f64::from(u8::from(outside(at) > 0.0));
-        }
-    }
-    (beyond / all, all)
+    (0..4).any(|side| {
+        let (from, to) = (projected[side], projected[(side + 1) % 4]);
+        let mut outwards = (to - from).cross(Vec3::Y).normalize();
+        outwards *= (from - middle).dot(outwards).signum();
+        (at - from).dot(outwards) > 0.0
+    })
 }
 
 /// Simpson's rule.
@@ -118,7 +89,6 @@ fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
             },
         );
         // The lamp's light on the mirror, by its parts as small as a point.
-        let lamp = Vec3::new(0.0, 2.9, 0.0);
         let normal = (corners[1] - corners[0]).cross(corners[3] - corners[0]);
         let area = f64::from(normal.length());
         let normal = normal.normalize();
@@ -127,14 +97,15 @@ fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
             * integral(0.0, 1.0, |x| {
                 integral(0.0, 1.0, |y| {
                     let at = corners[0] + x as f32 * u + y as f32 * v;
-                    let way = at - lamp;
+                    let way = at - LAMP;
                     let cosine = way.normalize().dot(normal).abs();
                     let reflected = fresnel_schlick(cosine, Vec3::splat(0.9)).x;
                     f64::from(10.0 * cosine / way.length_squared() * reflected)
                 })
             });
-        let (spilt_whole, light_whole) = spilt(&whole, &corners);
-        let (spilt_divided, light_divided) = spilt(&divided, &corners);
+        let [spilt_whole, spilt_divided] =
+            [&whole, &divided].map(|map| spilt(map, |at| is_outside(at, &corners)));
+        let [light_whole, light_divided] = [&whole, &divided].map(flux);
         assert!(
             spilt_divided < 0.35 * spilt_whole,
             "{number}: {spilt_divided} outside for {spilt_whole}"

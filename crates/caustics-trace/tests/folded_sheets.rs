@@ -3,39 +3,12 @@
 mod common;
 
 use caustics_geometry::TriangleMesh;
-use caustics_scene::{Light, Material, Scene};
+use caustics_scene::Scene;
 use caustics_trace::glam::Vec3;
 use caustics_trace::{FootprintSource, Photon, PhotonMap, TraceOptions, trace_photons};
 
-use common::scenes::{add_mesh, flattened};
-
-/// A lamp's height, close below the ceiling.
-const LAMP: f32 = 2.9;
-
-/// The ceiling's height.
-const CEILING: f32 = 3.0;
-
-/// A mirror on the ground that throws a lamp's light at the ceiling.
-fn lit(mirror: TriangleMesh) -> Scene {
-    let mut scene = Scene::new();
-    add_mesh(
-        &mut scene,
-        "mirror",
-        mirror,
-        Material::metal("metal", [0.9; 3]),
-    );
-    let corner = Vec3::new(-20.0, CEILING, -20.0);
-    let ceiling = caustics_geometry::shapes::quad(corner, 40.0 * Vec3::X, 40.0 * Vec3::Z);
-    add_mesh(
-        &mut scene,
-        "ceiling",
-        ceiling.expect("a valid ceiling"),
-        Material::diffuse("white", [0.8; 3]),
-    );
-    let lamp = Light::point([0.0, LAMP, 0.0], [10.0; 3]).expect("a valid lamp");
-    scene.add_light(lamp).expect("a valid lamp");
-    scene
-}
+use common::scenes::flattened;
+use common::spill::{CEILING, flux, spilt, under_a_lamp};
 
 fn trace(scene: &Scene, photons: u32, is_checked: bool) -> PhotonMap {
     let (world, intersector) = flattened(scene);
@@ -46,23 +19,6 @@ fn trace(scene: &Scene, photons: u32, is_checked: bool) -> PhotonMap {
         ..TraceOptions::default()
     };
     trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options")
-}
-
-fn flux(map: &PhotonMap) -> f64 {
-    map.photons.iter().map(|it| f64::from(it.flux.x)).sum()
-}
-
-/// The part of the flux that lies where `is_dark` says that there is none.
-fn spilt(map: &PhotonMap, is_dark: impl Fn(Vec3) -> bool) -> f64 {
-    let mut beyond = 0.0;
-    for photon in &map.photons {
-        // The corners of what the photon lights, a tenth of a cell inwards.
-        for (u, v) in [(-0.4, -0.4), (-0.4, 0.4), (0.4, -0.4), (0.4, 0.4)] {
-            let at = photon.position + u * photon.axes[0] + v * photon.axes[1];
-            beyond += 0.25 * f64::from(photon.flux.x) * f64::from(u8::from(is_dark(at)));
-        }
-    }
-    beyond / flux(map)
 }
 
 /// Whether as much light arrives as with many more photons.
@@ -89,7 +45,7 @@ fn creased() -> TriangleMesh {
 fn both_halves_of_folded_light_end_at_the_fold() {
     // What meets the mirror left of its middle lands left of it, and what meets it right of the middle
     // as well: the light of each half on that of the other, with an edge above the middle.
-    let scene = lit(creased());
+    let scene = under_a_lamp(creased());
     let (plain, checked) = (trace(&scene, 3000, false), trace(&scene, 3000, true));
     assert!(plain.photons.iter().all(|it| it.position.x < 1e-3));
     let is_dark = |at: Vec3| at.x > 0.0;
@@ -127,7 +83,7 @@ fn roof() -> TriangleMesh {
 fn light_of_two_faces_leaves_what_is_between_their_images_dark() {
     // Light that meets the ridge is thrown to 3 tan(2 lean) on either side.
     let half_gap = CEILING * (2.0 * 0.05f32.atan()).tan();
-    let scene = lit(roof());
+    let scene = under_a_lamp(roof());
     let (plain, checked) = (trace(&scene, 3000, false), trace(&scene, 3000, true));
     assert!(
         plain

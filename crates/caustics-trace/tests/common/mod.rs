@@ -4,6 +4,7 @@
 pub(crate) mod central;
 pub(crate) mod chain;
 pub(crate) mod scenes;
+pub(crate) mod spill;
 
 use caustics_trace::glam::{DVec3, Vec3};
 
