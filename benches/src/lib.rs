@@ -7,6 +7,7 @@ pub mod counted;
 pub mod document;
 #[cfg(feature = "embree")]
 pub mod embree;
+pub mod fields;
 pub mod flip;
 pub mod gpu;
 pub mod meshes;

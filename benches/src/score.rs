@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::fields::Fields;
 use crate::noise::Estimated;
 use crate::stage::Failure;
 
@@ -115,48 +116,39 @@ impl Row {
     }
 
     fn parse(line: &str) -> Result<Self, Failure> {
-        let fields: Vec<&str> = line.split(',').collect();
-        let expected = HEADER.split(',').count();
-        if fields.len() != expected {
-            return Err(format!("{} fields instead of {expected}: {line}", fields.len()).into());
-        }
-        let number = |index: usize| -> Result<f64, Failure> {
-            fields[index]
-                .parse()
-                .map_err(|_| format!("not a number: {}", fields[index]).into())
-        };
+        let fields = Fields::of(line, HEADER)?;
         Ok(Self {
-            scene: fields[0].to_owned(),
-            estimate: fields[1].to_owned(),
-            setting: fields[2].to_owned(),
-            photons: number(3)? as u32,
-            stored: number(4)? as u64,
-            trace_seconds: number(5)?,
-            trace_runs: number(6)? as u32,
-            estimate_seconds: number(7)?,
-            estimate_runs: number(8)? as u32,
-            look_seconds: number(9)?,
-            load_seconds: number(10)?,
-            energy_ratio: number(11)?,
-            relative_mse: number(12)?,
-            relative_mse_trimmed: number(13)?,
-            noise_free: match (fields[14], fields[15]) {
+            scene: fields.text(0).to_owned(),
+            estimate: fields.text(1).to_owned(),
+            setting: fields.text(2).to_owned(),
+            photons: fields.number(3)?,
+            stored: fields.number(4)?,
+            trace_seconds: fields.number(5)?,
+            trace_runs: fields.number(6)?,
+            estimate_seconds: fields.number(7)?,
+            estimate_runs: fields.number(8)?,
+            look_seconds: fields.number(9)?,
+            load_seconds: fields.number(10)?,
+            energy_ratio: fields.number(11)?,
+            relative_mse: fields.number(12)?,
+            relative_mse_trimmed: fields.number(13)?,
+            noise_free: match (fields.text(14), fields.text(15)) {
                 ("", "") => None,
                 _ => Some(Estimated {
-                    value: number(14)?,
-                    standard_error: number(15)?,
+                    value: fields.number(14)?,
+                    standard_error: fields.number(15)?,
                 }),
             },
-            p999_relative: number(16)?,
-            flip: match fields[17] {
+            p999_relative: fields.number(16)?,
+            flip: match fields.text(17) {
                 "" => None,
-                _ => Some(number(17)?),
+                _ => Some(fields.number(17)?),
             },
             conditions: Conditions {
-                threads: number(18)? as usize,
-                machine: fields[19].to_owned(),
-                date: fields[20].to_owned(),
-                commit: fields[21].to_owned(),
+                threads: fields.number(18)?,
+                machine: fields.text(19).to_owned(),
+                date: fields.text(20).to_owned(),
+                commit: fields.text(21).to_owned(),
             },
         })
     }

@@ -1,5 +1,6 @@
 //! What was measured, as it is kept in a CSV file.
 
+use caustics_benches::fields::Fields;
 use caustics_benches::score::Conditions;
 use caustics_benches::stage::Failure;
 
@@ -93,38 +94,33 @@ impl Row {
     }
 
     fn parse(line: &str) -> Result<Self, Failure> {
-        let fields: Vec<&str> = line.split(',').collect();
-        let expected = HEADER.split(',').count();
-        if fields.len() != expected {
-            return Err(format!("{} fields instead of {expected}: {line}", fields.len()).into());
-        }
-        let way = Way::ALL.into_iter().find(|it| it.name() == fields[2]);
-        let number = |index: usize| fields[index].parse::<f64>();
+        let fields = Fields::of(line, HEADER)?;
+        let way = Way::ALL.into_iter().find(|it| it.name() == fields.text(2));
         Ok(Self {
-            scene: fields[0].to_owned(),
-            photons: fields[1].parse()?,
-            way: way.ok_or_else(|| format!("no way {}", fields[2]))?,
-            stored: fields[3].parse()?,
-            trace: number(4)?,
-            splat: number(5)?,
-            empty: number(6)?,
-            build: number(7)?,
-            gather: number(8)?,
-            energy: number(9)?,
-            relative_mse: number(10)?,
-            trimmed: number(11)?,
-            flip: number(12).ok(),
-            off: number(13)?,
-            passes: fields[14].parse()?,
-            dispatches: fields[15].parse()?,
-            draws: fields[16].parse()?,
-            moved: number(17)?,
-            adapter: fields[18].to_owned(),
+            scene: fields.text(0).to_owned(),
+            photons: fields.number(1)?,
+            way: way.ok_or_else(|| format!("no way {}", fields.text(2)))?,
+            stored: fields.number(3)?,
+            trace: fields.number(4)?,
+            splat: fields.number(5)?,
+            empty: fields.number(6)?,
+            build: fields.number(7)?,
+            gather: fields.number(8)?,
+            energy: fields.number(9)?,
+            relative_mse: fields.number(10)?,
+            trimmed: fields.number(11)?,
+            flip: fields.number(12).ok(),
+            off: fields.number(13)?,
+            passes: fields.number(14)?,
+            dispatches: fields.number(15)?,
+            draws: fields.number(16)?,
+            moved: fields.number(17)?,
+            adapter: fields.text(18).to_owned(),
             conditions: Conditions {
-                threads: fields[19].parse()?,
-                machine: fields[20].to_owned(),
-                date: fields[21].to_owned(),
-                commit: fields[22].to_owned(),
+                threads: fields.number(19)?,
+                machine: fields.text(20).to_owned(),
+                date: fields.text(21).to_owned(),
+                commit: fields.text(22).to_owned(),
             },
         })
     }

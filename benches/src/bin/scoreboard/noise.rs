@@ -7,6 +7,7 @@ use std::path::Path;
 use caustics::filter::{energy_ratio, write_exr};
 use caustics::render::Estimate;
 use caustics_benches::counted::Counted;
+use caustics_benches::fields::Fields;
 use caustics_benches::noise::{Estimated, FLOOR, reference_noise};
 use caustics_benches::score::{Conditions, Row};
 use caustics_benches::stage::{Failure, Stage};
@@ -71,31 +72,22 @@ impl NoiseRow {
     }
 
     fn parse(line: &str) -> Result<Self, Failure> {
-        let fields: Vec<&str> = line.split(',').collect();
-        let expected = HEADER.split(',').count();
-        if fields.len() != expected {
-            return Err(format!("{} fields instead of {expected}: {line}", fields.len()).into());
-        }
-        let number = |index: usize| -> Result<f64, Failure> {
-            fields[index]
-                .parse()
-                .map_err(|_| format!("not a number: {}", fields[index]).into())
-        };
+        let fields = Fields::of(line, HEADER)?;
         let estimated = |index: usize| -> Result<Estimated, Failure> {
             Ok(Estimated {
-                value: number(index)?,
-                standard_error: number(index + 1)?,
+                value: fields.number(index)?,
+                standard_error: fields.number(index + 1)?,
             })
         };
         Ok(Self {
-            scene: fields[0].to_owned(),
-            photons: number(1)? as u32,
-            seconds: number(2)?,
-            energy_ratio: number(3)?,
+            scene: fields.text(0).to_owned(),
+            photons: fields.number(1)?,
+            seconds: fields.number(2)?,
+            energy_ratio: fields.number(3)?,
             noise: estimated(4)?,
             noise_as_halves: estimated(6)?,
-            date: fields[8].to_owned(),
-            commit: fields[9].to_owned(),
+            date: fields.text(8).to_owned(),
+            commit: fields.text(9).to_owned(),
         })
     }
 }
