@@ -172,6 +172,11 @@ impl FootprintIntegral {
         let Some((gaussian, strength)) = seen else {
             return Vec3::ZERO;
         };
+        // Most that are asked are out of its reach.
+        let away = Vec2::new(column as f32, row as f32) + 0.5 - gaussian.middle();
+        if away.abs().cmpgt(gaussian.extent() + 0.5).any() {
+            return Vec3::ZERO;
+        }
         let part = gaussian.part(column, row, texel.samples, weights) / texel.coverage;
         strength * (cosine_on(density, texel) * part)
     }
@@ -213,13 +218,20 @@ impl FootprintIntegral {
         texel: &Texel,
         screen: &Screen,
     ) -> Option<(PixelGaussian, Vec3)> {
+        let edges = screen.pixel_axes(texel.position, texel.normal)?;
+        // What is farther away than a pixel that the footprint reaches is spared the rest.
+        let [across, down] = edges.map(|edge| Vec2::from(density.along(edge)).length());
+        let away = Vec2::from(density.coordinates(texel.position)).length();
+        if away > density.outer_reach() + across + down {
+            return None;
+        }
         let (tangent, bitangent) = density.normal.any_orthonormal_pair();
         let up = density.towards_light();
         let slid = |way: Vec3| {
             let way = way - way.dot(density.normal) * up;
             Vec2::new(way.dot(tangent), way.dot(bitangent))
         };
-        let [x, y] = screen.pixel_axes(texel.position, texel.normal)?.map(slid);
+        let [x, y] = edges.map(slid);
         let to_pixels = Mat2::from_cols(x, y).inverse();
         let from_texel = to_pixels * slid(density.center - texel.position);
         let center = screen.project(texel.position)? + from_texel;
