@@ -246,9 +246,10 @@ impl FootprintIntegral {
 pub(crate) fn integrated_sigma(coverage: Coverage, kernel: TruncatedKernel) -> f32 {
     let reaching = LEAST_REACH / kernel.reach();
     let least = reaching * reaching - kernel.shape.pixel_variance();
-    match coverage {
-        Coverage::Overlap => OVERLAP_INTEGRATED_SIGMA.max(least.max(0.0).sqrt()),
-        _ => INTEGRATED_SIGMA,
+    if coverage.overlaps() {
+        OVERLAP_INTEGRATED_SIGMA.max(least.max(0.0).sqrt())
+    } else {
+        INTEGRATED_SIGMA
     }
 }
 

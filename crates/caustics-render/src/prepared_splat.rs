@@ -1,4 +1,4 @@
-use caustics_trace::{Coverage, Photon};
+use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
@@ -175,7 +175,7 @@ impl Splat {
         let shift = pixels_per_height(&splat.density, screen);
         let half_pixel = shift.map_or(0.0, |shift| 0.5 / shift.length());
         let is_coarse = splat.is_linear
-            && photon.coverage == Coverage::Overlap
+            && photon.coverage.overlaps()
             && kernel.shape == FootprintKernel::Gaussian
             && in_reach.is_own
             && in_reach.is_flat(half_pixel)

@@ -32,7 +32,7 @@ impl Kernels {
     /// The kernel of photons whose footprints lie so among others.
     #[inline]
     pub(crate) fn get(self, coverage: Coverage) -> TruncatedKernel {
-        if coverage == Coverage::Overlap {
+        if coverage.overlaps() {
             self.overlap
         } else {
             self.cell

@@ -3,7 +3,7 @@ use caustics_scene::{Camera, Projection};
 use glam::{Vec3, Vec4};
 
 use crate::ledger::{EnergyLedger, Fate};
-use crate::photon::Photon;
+use crate::photon::{Coverage, Photon};
 
 /// How far a footprint lights, in lengths of its axes: the widest kernel ends at 1.8 of them.
 const REACH: f32 = 2.0;
@@ -131,8 +131,12 @@ impl Culling {
     /// Whether a photon that has been booked as stored stays; it may be given more flux and a wider
     /// footprint. What is lost is booked anew.
     pub(crate) fn keeps(&self, photon: &mut Photon, ledger: &mut EnergyLedger) -> bool {
+        // Images carry no light that is booked.
+        let is_booked = photon.coverage != Coverage::Reflected;
         if let Some(fate) = self.rejects(photon) {
-            ledger.rebook(fate, photon.flux);
+            if is_booked {
+                ledger.rebook(fate, photon.flux);
+            }
             return false;
         }
         let survival = photon.flux.max_element() / self.min_flux;
@@ -142,12 +146,16 @@ impl Culling {
             let way = u64::from(photon.incoming.x.to_bits());
             let mut rng = CounterRng::new(x << 32 | y, z << 32 | way);
             if rng.next_f32() >= survival {
-                ledger.rebook(Fate::Roulette, photon.flux);
+                if is_booked {
+                    ledger.rebook(Fate::Roulette, photon.flux);
+                }
                 return false;
             }
             let more = photon.flux / survival;
-            ledger.gain(more - photon.flux);
-            ledger.strengthen((more - photon.flux).as_dvec3());
+            if is_booked {
+                ledger.gain(more - photon.flux);
+                ledger.strengthen((more - photon.flux).as_dvec3());
+            }
             photon.flux = more;
             // Survivors stand farther apart.
             photon.axes = photon.axes.map(|axis| survival.sqrt().recip() * axis);

@@ -1,6 +1,6 @@
 use glam::{DVec3, Vec3};
 
-use crate::photon::Photon;
+use crate::photon::{Coverage, Photon};
 
 /// What became of a photon's flux.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -212,10 +212,11 @@ impl EnergyLedger {
         self.book(fate, flux);
     }
 
-    /// Counts as stored just these photons.
+    /// Counts as stored just these photons; images of others do not count.
     pub(crate) fn store(&mut self, photons: &[Photon]) {
         self.fates[Fate::Stored as usize] = LedgerEntry::default();
-        for photon in photons {
+        let is_own = |photon: &&Photon| photon.coverage != Coverage::Reflected;
+        for photon in photons.iter().filter(is_own) {
             self.book(Fate::Stored, photon.flux);
         }
     }

@@ -63,6 +63,7 @@
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
 //! | divide photons at the edges of sheets of light | [`TraceOptions::divide_edges`] | |
+//! | give back what footprints spread beyond the ends of receivers | [`TraceOptions::reflect_at_boundaries`], [`Boundaries`], [`BoundaryEdge`], [`Coverage`] | Silverman 1986 |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
 //! | leave out what a host can do without | [`Culling`], [`ViewVolume`], [`SolidAngleLimit`] | |
 //! | store photons, or hand them to a graphics processor | [`CompactPhoton`], [`CompactFootprint`] | Cigolle et al. 2014; Ward 1991 |
@@ -115,8 +116,10 @@
 //! - Schlick, *An Inexpensive BRDF Model for Physically-based Rendering*, Eurographics 1994.
 //! - Schmidt, Budge, *Simple Nested Dielectrics in Ray Traced Images*, Journal of Graphics Tools
 //!   2002.
+//! - Silverman, *Density Estimation for Statistics and Data Analysis*, 1986, section 2.10 (reflection).
 
 mod area_emission;
+mod boundary;
 mod casters;
 mod compact;
 mod culling;
@@ -150,6 +153,7 @@ mod trail;
 mod wave;
 
 pub use area_emission::AreaSurface;
+pub use boundary::{Boundaries, BoundaryEdge};
 pub use casters::{Casters, MAX_CASTERS};
 pub use compact::{CompactFootprint, CompactPhoton};
 pub use culling::{Culling, SolidAngleLimit, ViewVolume};

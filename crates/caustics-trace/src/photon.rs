@@ -39,6 +39,20 @@ pub enum Coverage {
     /// so that a footprint covers at least four steps of the lattice and no seam between two shows. See
     /// [`RayDifferential::footprint`](crate::RayDifferential::footprint).
     Overlap,
+    /// One over the other, and the image of another photon behind the end of its receiver: it stands for
+    /// what that one's footprint spreads beyond, and carries no light of its own
+    /// ([`TraceOptions::reflect_at_boundaries`]).
+    ///
+    /// [`TraceOptions::reflect_at_boundaries`]: crate::TraceOptions::reflect_at_boundaries
+    Reflected,
+}
+
+impl Coverage {
+    /// Whether its footprint lies over others.
+    #[must_use]
+    pub fn overlaps(self) -> bool {
+        self != Self::Cell
+    }
 }
 
 /// How a photon's footprint was found.
@@ -82,7 +96,7 @@ impl FootprintSource {
 /// The photons of one tracing, and where the energy went.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PhotonMap {
-    /// All stored photons, in the order of emission.
+    /// All stored photons, in the order of emission, each with its [images](Coverage::Reflected) behind it.
     pub photons: Vec<Photon>,
     /// Where the energy went.
     pub ledger: EnergyLedger,

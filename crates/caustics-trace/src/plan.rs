@@ -1,8 +1,11 @@
+use std::sync::Arc;
+
 use caustics_accel::Intersect;
 use caustics_geometry::Ray;
 use caustics_sampling::{CounterRng, PointSet, Sequence, apportion_with_floor};
 use caustics_scene::World;
 
+use crate::boundary::Boundaries;
 use crate::casters::Casters;
 use crate::culling::Culling;
 use crate::emission::EmissionSample;
@@ -57,6 +60,7 @@ const LEAST_KEPT: f64 = 0.8;
 pub struct EmissionPlan {
     casters: Casters,
     batches: Vec<EmissionBatch>,
+    boundaries: Arc<Boundaries>,
 }
 
 /// The photons of one emitter.
@@ -196,13 +200,29 @@ impl EmissionPlan {
             batch
         };
         #[cfg(feature = "parallel")]
-        let batches = {
+        let batches: Vec<EmissionBatch> = {
             use rayon::prelude::*;
             emitters.into_par_iter().map(weigh).collect()
         };
         #[cfg(not(feature = "parallel"))]
-        let batches = emitters.into_iter().map(weigh).collect();
-        Self { casters, batches }
+        let batches: Vec<EmissionBatch> = emitters.into_iter().map(weigh).collect();
+        let may_overlap = batches.iter().any(|batch| batch.emitter.dimensions() > 2);
+        let boundaries = if may_overlap && options.reflect_at_boundaries && options.differentials {
+            Boundaries::of(world)
+        } else {
+            Boundaries::default()
+        };
+        Self {
+            casters,
+            batches,
+            boundaries: Arc::new(boundaries),
+        }
+    }
+
+    /// What footprints are reflected at; none where they are not.
+    #[must_use]
+    pub fn boundaries(&self) -> &Boundaries {
+        &self.boundaries
     }
 
     /// Gives each pair its photons.

@@ -189,6 +189,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         let caster = self.planned.emitter().caster();
         PathTracer::new(self.world, self.intersect, self.options)
             .aimed_at(caster.map(|it| (self.plan.casters(), it)), self.earlier)
+            .reflected_at(self.plan.boundaries())
     }
 
     fn trace_chunks<const N: usize>(

@@ -4,6 +4,7 @@ use caustics_sampling::CounterRng;
 use caustics_scene::{Surface, SurfacePoint, World};
 use glam::Vec3;
 
+use crate::boundary::Boundaries;
 use crate::casters::Casters;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
@@ -56,6 +57,8 @@ pub(crate) struct PathTracer<'a, I: ?Sized, const N: usize> {
     caster: Option<(&'a Casters, u32)>,
     /// The emitters of the same light whose photons come before these.
     earlier: &'a [EmissionBatch],
+    /// What footprints are reflected at; `None` where they are not.
+    boundaries: Option<&'a Boundaries>,
     /// Where the paths go, if that is asked for.
     pub(crate) trail: Option<Trail<'a>>,
     /// Which branches are followed; all without one.
@@ -74,6 +77,7 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             ledger: EnergyLedger::default(),
             caster: None,
             earlier: &[],
+            boundaries: None,
             trail: None,
             guide: None,
         }
@@ -90,6 +94,14 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         Self {
             caster,
             earlier,
+            ..self
+        }
+    }
+
+    /// With footprints reflected where receivers end.
+    pub(crate) fn reflected_at(self, boundaries: &'a Boundaries) -> Self {
+        Self {
+            boundaries: Some(boundaries),
             ..self
         }
     }
@@ -258,8 +270,8 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         let side = if point.from_outside { 1.0 } else { -1.0 };
         let (axes, coverage) = branch.differential.footprint(point.geometric_normal);
         let normal = side * point.geometric_normal;
-        self.paths.push(path_landed(branch.path, &axes, normal));
-        self.photons.push(Photon {
+        let path = path_landed(branch.path, &axes, normal);
+        let photon = Photon {
             position: point.spawn.position,
             incoming: branch.ray.direction,
             flux: branch.flux,
@@ -269,7 +281,17 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
             events: branch.events,
             source: branch.source,
             coverage,
-        });
+        };
+        self.paths.push(path);
+        self.photons.push(photon);
+        if let Some(boundaries) = self.boundaries
+            && coverage.overlaps()
+        {
+            boundaries.reflect(self.intersect, &photon, |image| {
+                self.paths.push(path);
+                self.photons.push(image);
+            });
+        }
     }
 
     fn branch_out(

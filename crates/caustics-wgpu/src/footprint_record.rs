@@ -35,7 +35,8 @@ pub struct FootprintRecord {
 }
 
 impl FootprintRecord {
-    /// What is added to the object of a photon whose footprint is a [`Coverage::Overlap`].
+    /// What is added to the object of a photon whose footprint
+    /// [overlaps](Coverage::overlaps) others.
     pub const OVERLAP: u32 = 1 << 31;
 
     /// Index of the receiver among the world's objects.
@@ -44,7 +45,8 @@ impl FootprintRecord {
         self.object & !Self::OVERLAP
     }
 
-    /// How the footprint lies among those of other photons.
+    /// How the footprint lies among those of other photons. One that is
+    /// [reflected](Coverage::Reflected) is drawn as any that overlap, and told as one.
     #[must_use]
     pub fn coverage(&self) -> Coverage {
         if self.object & Self::OVERLAP == 0 {
@@ -63,9 +65,10 @@ impl FootprintRecord {
     /// The record of a photon whose emission has this number.
     #[must_use]
     pub fn numbered(photon: &Photon, number: u32) -> Self {
-        let overlap = match photon.coverage {
-            Coverage::Overlap => Self::OVERLAP,
-            _ => 0,
+        let overlap = if photon.coverage.overlaps() {
+            Self::OVERLAP
+        } else {
+            0
         };
         Self {
             position: photon.position.to_array(),

@@ -79,7 +79,7 @@ pub(crate) fn params(
         flags: if checks { TraceParams::CHECKS } else { 0 },
         slots: 0,
         first_edge: into.scratch.first_edge,
-        unused_a: 0,
+        first_boundary: plan.first_boundary,
         unused_b: 0,
         unused_c: 0,
         emitters: [Emitter::default(); MAX_EMITTERS],

@@ -88,7 +88,8 @@ pub(crate) struct TraceParams {
     pub(crate) flags: u32,
     pub(crate) slots: u32,
     pub(crate) first_edge: u32,
-    pub(crate) unused_a: u32,
+    /// Where in the lists the boundaries begin; [`NO_BOUNDARIES`](Self::NO_BOUNDARIES) where there are none.
+    pub(crate) first_boundary: u32,
     pub(crate) unused_b: u32,
     pub(crate) unused_c: u32,
     pub(crate) emitters: [Emitter; MAX_EMITTERS],
@@ -97,4 +98,6 @@ pub(crate) struct TraceParams {
 impl TraceParams {
     pub(crate) const CHECKS: u32 = 1;
     pub(crate) const NEIGHBOURS_ONLY: u32 = 2;
+
+    pub(crate) const NO_BOUNDARIES: u32 = u32::MAX;
 }

@@ -5,25 +5,32 @@ use caustics_accel::Intersect;
 use caustics_sampling::Sequence;
 use caustics_scene::World;
 use caustics_trace::{
-    AreaSurface, Branching, Culling, EmissionBatch, EmissionDomain, EmissionPlan, TraceOptions,
+    AreaSurface, Boundaries, Branching, Culling, EmissionBatch, EmissionDomain, EmissionPlan,
+    TraceOptions,
 };
 use glam::DVec3;
 
 use crate::GpuError;
 use crate::body_order::{BodyOrder, at_most};
 use crate::emitter_mirror::{largest_flux, mirror, sample_from, set_media};
-use crate::trace_params::{Emitter as Mirror, MAX_EMITTERS, NO_CASTER};
+use crate::trace_params::{Emitter as Mirror, MAX_EMITTERS, NO_CASTER, TraceParams};
 
 /// The largest flux of a photon, in units of the ledger's sums.
 const LARGEST_FLUX: f32 = (1 << 30) as f32;
+
+/// Words of the start and the end of an edge. Mirrors the constant in `shaders/boundary.wgsl`.
+pub(crate) const BOUNDARY_WORDS: u32 = 6;
 
 /// The photons of all lights, as the shaders emit them: the same light for the same number as
 /// [`trace_photons`](caustics_trace::trace_photons) emits with the same options.
 #[derive(Clone, Debug)]
 pub struct TracePlan {
     pub(crate) emitters: Vec<PlannedEmitter>,
-    /// What the emitters refer to: cumulative areas, runs of points, projection maps.
+    /// What the emitters refer to: cumulative areas, runs of points, projection maps; and boundaries.
     pub(crate) lists: Vec<u32>,
+    /// Where in the lists the boundaries begin: for each object where its edges start, where the last
+    /// one's end, and the edges' ends.
+    pub(crate) first_boundary: u32,
     pub(crate) options: TraceOptions,
     pub(crate) flux_scale: f32,
     power: DVec3,
@@ -78,6 +85,7 @@ impl TracePlan {
         let mut plan = Self {
             emitters: Vec::with_capacity(emission.batches().len()),
             lists: Vec::new(),
+            first_boundary: TraceParams::NO_BOUNDARIES,
             options: *options,
             flux_scale: 1.0,
             power: DVec3::ZERO,
@@ -118,6 +126,7 @@ impl TracePlan {
             let emitters = plan.emitters.len() as u64 - u64::from(first_of_light);
             at_most("emitters of one light", emitters, MAX_EMITTERS as u64)?;
         }
+        plan.set_boundaries(world, emission.boundaries());
         if plan.lists.is_empty() {
             // A buffer has at least one word.
             plan.lists.push(0);
@@ -141,6 +150,24 @@ impl TracePlan {
     #[must_use]
     pub fn power(&self) -> DVec3 {
         self.power
+    }
+
+    /// Lists what footprints are reflected at.
+    fn set_boundaries(&mut self, world: &World, boundaries: &Boundaries) {
+        let edges = boundaries.edges();
+        if edges.is_empty() {
+            return;
+        }
+        self.first_boundary = self.lists.len() as u32;
+        let objects = world.objects().len() as u32;
+        let first_edge = self.first_boundary + objects + 1;
+        // In the order of their objects.
+        let before = |object: u32| edges.partition_point(|edge| edge.object < object) as u32;
+        let starts = (0..=objects).map(|object| first_edge + BOUNDARY_WORDS * before(object));
+        self.lists.extend(starts);
+        let ends = edges.iter().flat_map(|edge| edge.vertices);
+        let places = ends.map(|vertex| world.positions()[vertex as usize].to_array());
+        self.lists.extend(places.flatten().map(f32::to_bits));
     }
 
     /// Sets what an emitter's photons are made from.

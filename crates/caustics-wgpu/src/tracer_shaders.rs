@@ -90,6 +90,7 @@ macro_rules! pieces {
             shader_piece!("sheet"),
             shader_piece!("photon_turns"),
             shader_piece!("photon_store"),
+            shader_piece!("boundary"),
             shader_piece!("tracer"),
             $(shader_piece!($last)),+
         ]
@@ -217,6 +218,11 @@ mod tests {
             let constant = |name| reflection::constant(&module, name);
             assert_eq!(constant("PARAMETERS"), parameters);
             assert_eq!(constant("MAX_EMITTERS"), MAX_EMITTERS as u32);
+            assert_eq!(constant("NO_BOUNDARIES"), TraceParams::NO_BOUNDARIES);
+            assert_eq!(
+                constant("BOUNDARY_WORDS"),
+                crate::trace_plan::BOUNDARY_WORDS
+            );
             assert_eq!(constant("MAX_WAITING"), MAX_WAITING);
             assert_eq!(constant("LEAF_BIT"), LEAF_BIT);
             assert_eq!(constant("SPHERE_BIT"), SPHERE_BIT);
@@ -385,7 +391,7 @@ mod tests {
                 flags,
                 slots,
                 first_edge,
-                unused_a,
+                first_boundary,
                 unused_b,
                 unused_c,
                 emitters,

@@ -3,7 +3,7 @@
 
 mod common;
 
-use caustics_trace::TraceOptions;
+use caustics_trace::{Coverage, TraceOptions};
 
 use common::tracing::{
     Difference, SCENES, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
@@ -57,6 +57,9 @@ fn the_same_photons_land_in_the_same_places() {
         assert_eq!(ledger.divided_photons > 100, is_checked, "{name}");
         // Of those in whose footprints the blur is as wide as the step, rounding decides.
         assert_eq!(difference.overlaps > 1000, !is_checked, "{name}");
+        let photons = trails.iter().flat_map(|trail| &trail.photons);
+        let images = photons.filter(|photon| photon.coverage == Coverage::Reflected);
+        assert_eq!(images.count() > 1000, !is_checked, "{name}");
         let others = difference.other_coverages;
         assert!(others * 1000 <= difference.overlaps, "{name}: {others}");
     }

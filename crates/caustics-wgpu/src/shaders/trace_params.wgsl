@@ -102,7 +102,8 @@ struct TraceParams {
     slots: u32,
     // Where in `links` the places of records to be divided begin.
     first_edge: u32,
-    unused_a: u32,
+    // Where in `emission_lists` the boundaries begin; `NO_BOUNDARIES` where there are none.
+    first_boundary: u32,
     unused_b: u32,
     unused_c: u32,
     emitters: array<Emitter, MAX_EMITTERS>,

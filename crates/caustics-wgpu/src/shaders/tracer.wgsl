@@ -72,6 +72,9 @@ fn receive(branch: Branch, point: SurfacePoint) -> u32 {
     );
     let path = path_landed(branch.path, its.axes, record.normal);
     let has_room = store_photon(record, branch, path);
+    if PARAMETERS > 2u && its.is_overlap && has_room {
+        reflect_at_boundaries(record, branch, path, object);
+    }
     return select(FATE_CROWDED, FATE_STORED, has_room);
 }
 

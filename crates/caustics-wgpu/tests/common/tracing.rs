@@ -271,7 +271,8 @@ impl Difference {
             self.axes = larger(self.axes, axes / longer);
         }
         self.directions = larger(self.directions, directions);
-        self.other_coverages += usize::from(record.coverage() != photon.coverage);
+        let overlaps = photon.coverage.overlaps();
+        self.other_coverages += usize::from(record.coverage().overlaps() != overlaps);
         self.overlaps += usize::from(record.coverage() == Coverage::Overlap);
         self.equal_records.0 += usize::from(*record == expected);
         self.equal_records.1 += 1;
