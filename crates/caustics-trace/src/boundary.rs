@@ -164,7 +164,7 @@ impl Mirror {
     fn of(photon: &Photon, [start, end]: [Vec3; 2]) -> Option<Self> {
         let edge = end - start;
         let length = edge.length();
-        let along = edge / length;
+        let along = (1.0 / length) * edge;
         let normal = photon.normal;
         let way = along.dot(photon.position - start);
         // No two edges of one straight end have the same photon.
@@ -175,7 +175,7 @@ impl Mirror {
         let height = to_edge.dot(normal);
         let across = to_edge - height * normal;
         let distance = across.length();
-        let outwards = across / distance;
+        let outwards = (1.0 / distance) * across;
         let reach = reach(photon, outwards);
         // Not of a photon on the edge, either, which has no side.
         (distance < reach && height.abs() < IN_PLANE * reach).then_some(Self {

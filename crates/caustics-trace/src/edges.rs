@@ -4,6 +4,7 @@ use caustics_accel::Intersect;
 use glam::Vec2;
 
 use crate::emission::EmissionSample;
+use crate::give_back::give_back;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO, in_plane};
 use crate::path_guide::PathGuide;
@@ -190,6 +191,8 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             divided.push(edge.footprint(stratum, &before, strata.get(number + 1)));
             before = *stratum;
         }
+        let back = give_back(&mut divided[first..], inner, row.axis, row.sign);
+        divided.extend(back);
         let are_finite = divided[first..]
             .iter()
             .all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));

@@ -122,7 +122,8 @@ pub struct EnergyLedger {
     pub bounded_differentials: u64,
     /// Footprints that were taken from a neighbour's landing because their differential was longer.
     pub replaced_differentials: u64,
-    /// Photons at the ends of a lattice's rows that were divided, each in place of one.
+    /// Photons at the ends of a lattice's rows that were divided: each into four parts and a fifth photon, what
+    /// they give back to the cell before them.
     pub divided_photons: u64,
     /// What the photons at the edges of sheets of light carry more than their paths brought them, or
     /// less where it is negative, in watts: each stands for the light up to the edge, of which its row

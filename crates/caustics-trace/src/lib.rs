@@ -129,6 +129,7 @@ mod domain_reuse;
 mod edges;
 mod emission;
 mod emitter;
+mod give_back;
 mod lattice;
 mod ledger;
 mod live;

@@ -176,7 +176,7 @@ mod tests {
     use crate::shader::{assert_layout, reflection};
     use crate::trace_counters::TraceCounters;
     use crate::trace_params::{MAX_EMITTERS, TraceParams};
-    use crate::tracer_shaders::{LINK_WORDS, PARTS};
+    use crate::tracer_shaders::{LINK_WORDS, RECORDS_OF_DIVIDED};
 
     #[test]
     fn the_shaders_are_valid_and_agree_with_rust() {
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(constant("MAX_EMITTERS"), MAX_EMITTERS as u32);
         assert_eq!(constant("LINK_PLACE"), !constant("LINK_THINNED"));
         assert_eq!(constant("LINK_WORDS"), LINK_WORDS);
-        assert_eq!(constant("PARTS"), PARTS);
+        assert_eq!(constant("RECORDS_OF_DIVIDED"), RECORDS_OF_DIVIDED);
 
         let (module, _) = reflection::validated(&COUNTS).unwrap_or_else(|it| panic!("{it}"));
         let slots: Vec<(u32, Slot)> = (0..).zip(COUNT_SLOTS).collect();

@@ -1,7 +1,7 @@
 use caustics_trace::{EnergyLedger, Fate, LedgerEntry};
 use glam::DVec3;
 
-use crate::tracer_shaders::PARTS;
+use crate::tracer_shaders::RECORDS_OF_DIVIDED;
 use crate::{GpuError, TracePlan};
 
 /// What the tracer's counters say, read back.
@@ -91,7 +91,7 @@ impl TraceCounters {
         ledger.add(
             Fate::Stored,
             &LedgerEntry {
-                count: u64::from(PARTS - 1) * ledger.divided_photons,
+                count: u64::from(RECORDS_OF_DIVIDED - 1) * ledger.divided_photons,
                 flux: gain,
             },
         );

@@ -16,6 +16,9 @@ pub(crate) const LINK_WORDS: u32 = 3;
 /// The parts of a divided photon, likewise.
 pub(crate) const PARTS: u32 = 4;
 
+/// The records of a divided photon, likewise: its parts, and what they give back.
+pub(crate) const RECORDS_OF_DIVIDED: u32 = PARTS + 1;
+
 /// Which hierarchy rays traverse. Both give the same hits.
 ///
 /// Chosen by measurement on a software adapter (8 invocations in lockstep), as the speed of tracing
@@ -263,6 +266,7 @@ mod tests {
             let constant = |name| reflection::constant(&module, name);
             assert_eq!(constant("LINK_WORDS"), LINK_WORDS);
             assert_eq!(constant("PARTS"), PARTS);
+            assert_eq!(constant("RECORDS_OF_DIVIDED"), RECORDS_OF_DIVIDED);
             assert_eq!(constant("LINK_PLACE"), !constant("LINK_DIVIDED"));
             // A path's turns leave the flag of a divided record free.
             let turns = constant("TURN_FIRST") + constant("TURN_SURFACES");

@@ -121,7 +121,7 @@ fn what_has_no_room_is_counted() {
     let whole = trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS).counters;
     let crowded = trace_on_gpu(gpu, tracer, &stage, &plan, 100).counters;
     assert_eq!((crowded.stored, whole.crowded.count), (100, 0));
-    let landed = u64::from(whole.stored) - 3 * whole.ledger.divided_photons;
+    let landed = u64::from(whole.stored) - 4 * whole.ledger.divided_photons;
     assert_eq!(crowded.crowded.count, landed - 100);
     let ledger = &crowded.ledger;
     let incoming = ledger.emitted().flux + ledger.roulette_gain() + ledger.edge_gain;
@@ -139,9 +139,9 @@ fn photons_whose_parts_have_no_room_stay_whole() {
     let plan = stage.plan(&options());
     let whole = trace_on_gpu(gpu, tracer, &stage, &plan, 8 * PHOTONS);
     let divided = whole.counters.ledger.divided_photons;
-    let landed = whole.counters.stored - 3 * divided as u32;
+    let landed = whole.counters.stored - 4 * divided as u32;
     assert!(divided > 100);
-    for room in [0, 1, 5, 30, 31] {
+    for room in [0, 1, 6, 30, 31] {
         let traced = trace_on_gpu(gpu, tracer, &stage, &plan, landed + room);
         let TraceCounters {
             stored,
@@ -149,15 +149,15 @@ fn photons_whose_parts_have_no_room_stay_whole() {
             crowded,
         } = traced.counters;
         assert_eq!(crowded.count, 0);
-        // Four places for each of those that are divided.
-        assert_eq!(ledger.divided_photons, u64::from(room / 4));
-        assert_eq!(stored, landed + 3 * (room / 4));
+        // Five places for each of those that are divided.
+        assert_eq!(ledger.divided_photons, u64::from(room / 5));
+        assert_eq!(stored, landed + 4 * (room / 5));
         assert!(ledger.imbalance() < 1e-6);
         // All others have one record for each part that landed.
         let all = traced.photons.iter().zip(&whole.photons);
         let as_whole = all.clone().filter(|(a, b)| a == b).count();
         let edges = all.filter(|(a, b)| a.len() != b.len()).count() as u64;
-        assert!(edges <= divided - u64::from(room / 4));
+        assert!(edges <= divided - u64::from(room / 5));
         assert!(as_whole as u64 >= u64::from(PHOTONS) - edges);
     }
 }

@@ -36,7 +36,7 @@ fn mirror_of(record: FootprintRecord, start: vec3<f32>, end: vec3<f32>) -> Mirro
     let none = Mirror(vec3(0.0), vec3(0.0), false);
     let edge = end - start;
     let length = length_of(edge);
-    let along = edge / length;
+    let along = (1.0 / length) * edge;
     let normal = record.normal;
     let way = dot(along, record.position - start);
     if !(way >= 0.0 && way < length) || abs(dot(along, normal)) > BOUNDARY_IN_PLANE {
@@ -46,7 +46,7 @@ fn mirror_of(record: FootprintRecord, start: vec3<f32>, end: vec3<f32>) -> Mirro
     let height = dot(to_edge, normal);
     let across = to_edge - height * normal;
     let distance = length_of(across);
-    let outwards = across / distance;
+    let outwards = (1.0 / distance) * across;
     let reach = reach_along(record, outwards);
     if !(distance < reach && abs(height) < BOUNDARY_IN_PLANE * reach) {
         return none;

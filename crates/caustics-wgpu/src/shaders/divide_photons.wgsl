@@ -108,6 +108,27 @@ fn part_of(
     return part;
 }
 
+// Twins: give_back.rs.
+const GIVE_BACK_PEAK: f32 = 0.72534;
+const GIVE_BACK_CUT: f32 = 0.012913223;
+const LEAST_KEPT: f32 = 0.3;
+const GIVE_BACK_SHIFT: f32 = 0.1;
+const GIVE_BACK_WIDTH: f32 = 0.6;
+
+// How much of even light a footprint with this middle and `axis` has along it at a place.
+fn even_part(middle: vec3<f32>, axis: vec3<f32>, place: vec3<f32>) -> f32 {
+    let squared = rounded_dot(axis, axis);
+    if squared == 0.0 {
+        return 0.0;
+    }
+    let distance = rounded_dot(place - middle, axis) * (1.0 / squared);
+    var power = max(1.0 - rounded(GIVE_BACK_CUT * distance * distance), 0.0);
+    for (var i = 0u; i < 7u; i++) {
+        power *= power;
+    }
+    return rounded(GIVE_BACK_PEAK * power);
+}
+
 fn is_finite_record(record: FootprintRecord) -> bool {
     return all_finite(record.position) && all_finite(record.axis_u) && all_finite(record.axis_v);
 }
@@ -202,7 +223,6 @@ fn divide_record(place: u32) {
         narrowing = checked_ratio(photon, axis_of(photon, beside), landings[beside]);
     }
     var before = Stratum(row.inner.position, row.inner.axis, row.inner.object, -1.0);
-    var is_sound = true;
     for (var part = 0u; part < PARTS; part++) {
         let stratum = STRATA[part];
         let has_after = part + 1u < PARTS;
@@ -218,20 +238,52 @@ fn divide_record(place: u32) {
             has_after,
         );
         before = strata[part];
+    }
+    // What there is too much of on the parts goes back.
+    var kept: array<f32, PARTS>;
+    for (var part = 0u; part < PARTS; part++) {
+        let place = parts[part].position;
+        var sum = even_part(row.inner.position, row.inner.axis, place);
+        for (var other = 0u; other < PARTS; other++) {
+            sum += even_part(parts[other].position, axis_of(parts[other], row.axis), place);
+        }
+        kept[part] = clamp(1.0 / (sum * sum), LEAST_KEPT, 1.0);
+    }
+    var back = parts[0];
+    var flux_back = vec3(0.0);
+    var is_sound = true;
+    for (var part = 0u; part < PARTS; part++) {
+        let flux = flux_of(parts[part]);
+        let flux_kept = rounded_vector(kept[part] * flux);
+        flux_back += flux - flux_kept;
+        parts[part].flux_r = flux_kept.x;
+        parts[part].flux_g = flux_kept.y;
+        parts[part].flux_b = flux_kept.z;
         is_sound = is_sound && is_finite_record(parts[part]);
     }
+    back.flux_r = flux_back.x;
+    back.flux_g = flux_back.y;
+    back.flux_b = flux_back.z;
+    back.position = row.inner.position + row.side * GIVE_BACK_SHIFT * row.inner.axis;
+    if row.axis == 0u {
+        back.axis_u = GIVE_BACK_WIDTH * row.inner.axis;
+    } else {
+        back.axis_v = GIVE_BACK_WIDTH * row.inner.axis;
+    }
+    is_sound = is_sound && is_finite_record(back);
     if !is_sound {
         return;
     }
-    let first = atomicAdd(&counters[COUNTER_STORED], PARTS);
-    if first + PARTS > arrayLength(&appended) {
+    let first = atomicAdd(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
+    if first + RECORDS_OF_DIVIDED > arrayLength(&appended) {
         // It stays whole.
-        atomicSub(&counters[COUNTER_STORED], PARTS);
+        atomicSub(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
         return;
     }
     for (var part = 0u; part < PARTS; part++) {
         appended[first + part] = parts[part];
     }
+    appended[first + PARTS] = back;
     links[link + 2u] = LINK_DIVIDED | (first + 1u);
     atomicAdd(&group_divided, 1u);
 }

@@ -29,7 +29,7 @@ fn count_photons(
     var place = links[photon];
     while place != 0u {
         let link = link_of(batch.first_link, place);
-        count += select(1u, PARTS, (links[link + 2u] & LINK_DIVIDED) != 0u);
+        count += select(1u, RECORDS_OF_DIVIDED, (links[link + 2u] & LINK_DIVIDED) != 0u);
         place = links[link] & LINK_PLACE;
     }
     counts[photon] = count;

@@ -15,6 +15,9 @@ const LINK_DIVIDED: u32 = 0x80000000u;
 // The parts of a photon that is divided. Twin: the length of `STRATA` in edges.rs of caustics-trace.
 const PARTS: u32 = 4u;
 
+// Its records: the parts, and what they give back.
+const RECORDS_OF_DIVIDED: u32 = PARTS + 1u;
+
 // Where the words of the record before a place are.
 fn link_of(first_link: u32, place: u32) -> u32 {
     return first_link + LINK_WORDS * (place - 1u);

@@ -41,7 +41,7 @@ fn order_photon(photon: u32) {
         var flux_after = flux;
         if (parts & LINK_DIVIDED) != 0u {
             flux_after = vec3(0.0);
-            for (var part = PARTS; part > 0u; part--) {
+            for (var part = RECORDS_OF_DIVIDED; part > 0u; part--) {
                 ordered -= 1u;
                 record = appended[(parts & LINK_PLACE) + part - 2u];
                 flux_after += flux_of(record);

@@ -14,6 +14,11 @@ fn rounded_vector(v: vec3<f32>) -> vec3<f32> {
     return vec3(rounded(v.x), rounded(v.y), rounded(v.z));
 }
 
+fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    let parts = rounded_vector(a * b);
+    return parts.x + parts.y + parts.z;
+}
+
 // Twin: `gamma` in caustics-geometry's spawn.rs.
 fn gamma(roundings: f32) -> f32 {
     let error = roundings * UNIT_ROUNDOFF;

@@ -7,6 +7,5 @@ const TURNED: u32 = 0x80000000u;
 // over. Twin: `signed_area` in path_guide.rs.
 fn signed_area(u: vec3<f32>, v: vec3<f32>, normal: vec3<f32>) -> f32 {
     let across = rounded_vector(u.yzx * v.zxy) - rounded_vector(v.yzx * u.zxy);
-    let parts = rounded_vector(across * normal);
-    return parts.x + parts.y + parts.z;
+    return rounded_dot(across, normal);
 }

@@ -75,8 +75,9 @@ pub(crate) fn trails_by_cpu(stage: &Stage, options: &TraceOptions) -> Vec<Photon
             let is_divided = first.source == FootprintSource::Divided;
             assert!(is_divided || photon.incoming == first.incoming);
             let mut parts = vec![first];
+            // Four parts, and what they give back.
             if is_divided {
-                parts.extend(checked.by_ref().take(3));
+                parts.extend(checked.by_ref().take(4));
             }
             let after: DVec3 = parts.iter().map(|it| it.flux.as_dvec3()).sum();
             let gain = after - photon.flux.as_dvec3();
@@ -185,7 +186,7 @@ pub(crate) struct Difference {
     pub(crate) paths: BTreeMap<&'static str, Vec<usize>>,
     /// The largest distance between landing points, relative to the size of the scene.
     pub(crate) position: f32,
-    /// The largest relative difference of a flux.
+    /// The largest difference of a flux, relative to the largest that the emitted photon has left.
     pub(crate) flux: f32,
     /// The largest difference of a footprint's axis, relative to the longer one.
     pub(crate) axes: f32,
@@ -237,8 +238,10 @@ impl Difference {
                 .map(|(path, record)| (*path, record.receiver()));
             let objects = trail.photons.iter().map(|photon| photon.object);
             if paths.eq(trail.paths.iter().copied().zip(objects)) {
+                let fluxes = trail.photons.iter().map(|photon| photon.flux.max_element());
+                let scale = [size, fluxes.fold(0.0, f32::max)];
                 for ((_, record), photon) in stored.iter().zip(&trail.photons) {
-                    difference.compare(number as u32, photon, record, size);
+                    difference.compare(number as u32, photon, record, scale);
                 }
             } else {
                 let cause = if stored.len() == trail.paths.len() {
@@ -252,7 +255,14 @@ impl Difference {
         difference
     }
 
-    fn compare(&mut self, number: u32, photon: &Photon, record: &FootprintRecord, size: f32) {
+    /// `scale` is the size of the scene, and the largest flux that the emitted photon has left.
+    fn compare(
+        &mut self,
+        number: u32,
+        photon: &Photon,
+        record: &FootprintRecord,
+        [size, brightest]: [f32; 2],
+    ) {
         let expected = FootprintRecord::numbered(photon, number);
         let distance = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).distance(b.into());
         let flux = record.flux() - photon.flux;
@@ -263,10 +273,9 @@ impl Difference {
             .max(distance(record.normal, expected.normal));
         let position = distance(record.position, expected.position) / size;
         self.position = larger(self.position, position);
-        self.flux = larger(
-            self.flux,
-            flux.abs().max_element() / photon.flux.max_element(),
-        );
+        // What parts give back is a difference of nearly equal numbers, or nothing.
+        let relative = flux.abs().max_element() / brightest;
+        self.flux = larger(self.flux, relative);
         if axes != 0.0 {
             self.axes = larger(self.axes, axes / longer);
         }
