@@ -191,7 +191,13 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             divided.push(edge.footprint(stratum, &before, strata.get(number + 1)));
             before = *stratum;
         }
-        let back = give_back(&mut divided[first..], inner, row.axis, row.sign);
+        // As long as its neighbour lets it be.
+        let step = -in_plane(photon, inner);
+        let mut unit = row.sign * inner.axes[row.axis];
+        if unit.length_squared() > LIMIT * LIMIT * step.length_squared() {
+            unit = step;
+        }
+        let back = give_back(&mut divided[first..], inner.position, unit, row.axis);
         divided.extend(back);
         let are_finite = divided[first..]
             .iter()

@@ -1,3 +1,5 @@
+use glam::Vec3;
+
 use crate::photon::Photon;
 
 /// The value of the default footprint's Gaussian at its middle, times the axis.
@@ -15,7 +17,8 @@ const SHIFT: f32 = 0.1;
 const WIDTH: f32 = 0.6;
 
 /// Lets the parts of a divided photon give back what its place has too much of, and returns it as a photon
-/// beside `inner`, the photon before them in their row; `axis` and `sign` say where the row leads.
+/// in the middle of the cell before them in their row, `inner`; `unit` spans that cell along lattice axis
+/// `axis`, towards the parts.
 ///
 /// Side by side, footprints as wide as their cells sum to even light. Where narrow ones follow on a wide
 /// one they do not: it reaches far over the narrow ones' light, and they do not reach as far over its own,
@@ -26,42 +29,40 @@ const WIDTH: f32 = 0.6;
 /// gain stay as they are.
 pub(crate) fn give_back(
     parts: &mut [Photon],
-    inner: &Photon,
+    inner: Vec3,
+    unit: Vec3,
     axis: usize,
-    sign: f32,
 ) -> Option<Photon> {
     let mut back = *parts.first()?;
     let kept: Vec<f32> = parts
         .iter()
         .map(|part| {
-            let mut sum = kernel(inner, axis, part);
+            let mut sum = kernel(inner, unit, part.position);
             for other in &*parts {
-                sum += kernel(other, axis, part);
+                sum += kernel(other.position, other.axes[axis], part.position);
             }
             (1.0 / (sum * sum)).clamp(LEAST_KEPT, 1.0)
         })
         .collect();
-    back.flux = glam::Vec3::ZERO;
+    back.flux = Vec3::ZERO;
     for (part, kept) in parts.iter_mut().zip(kept) {
         let flux = kept * part.flux;
         back.flux += part.flux - flux;
         part.flux = flux;
     }
-    let unit = inner.axes[axis];
-    back.position = inner.position + sign * SHIFT * unit;
+    back.position = inner + SHIFT * unit;
     back.axes[axis] = WIDTH * unit;
     Some(back)
 }
 
-/// How much of even light a photon's footprint has along an axis at the middle of another one.
-fn kernel(photon: &Photon, axis: usize, at: &Photon) -> f32 {
-    let axis = photon.axes[axis];
+/// How much of even light a footprint with this middle and `axis` has along it at a place.
+fn kernel(middle: Vec3, axis: Vec3, place: Vec3) -> f32 {
     let squared = axis.length_squared();
     if squared == 0.0 {
         return 0.0;
     }
     // By a reciprocal, since processors that divide so are not to differ.
-    let distance = (at.position - photon.position).dot(axis) * (1.0 / squared);
+    let distance = (place - middle).dot(axis) * (1.0 / squared);
     let mut power = (1.0 - CUT * distance * distance).max(0.0);
     for _ in 0..7 {
         power *= power;
@@ -73,7 +74,6 @@ fn kernel(photon: &Photon, axis: usize, at: &Photon) -> f32 {
 mod tests {
     use super::*;
     use crate::photon::{Coverage, FootprintSource};
-    use glam::Vec3;
 
     /// A photon of even light with its middle there, as wide as that.
     fn photon(middle: f32, width: f32) -> Photon {
@@ -120,7 +120,8 @@ mod tests {
             plain.extend(parts);
             let flux = |photons: &[Photon]| photons.iter().map(|it| it.flux.x).sum::<f32>();
 
-            let back = give_back(&mut parts, &inner, 0, sign).unwrap();
+            let unit = sign * inner.axes[0];
+            let back = give_back(&mut parts, inner.position, unit, 0).unwrap();
             all.extend(parts);
             all.push(back);
             assert!((flux(&all) - flux(&plain)).abs() < 1e-5);
@@ -136,11 +137,11 @@ mod tests {
     #[test]
     fn parts_as_wide_as_their_neighbours_keep_their_light() {
         let mut parts = [0.5, 1.5, 2.5, 3.5].map(|middle| photon(middle, 1.0));
-        let back = give_back(&mut parts, &photon(-0.5, 1.0), 0, 1.0).unwrap();
+        let back = give_back(&mut parts, -0.5 * Vec3::X, Vec3::X, 0).unwrap();
         assert!(back.flux.x < 0.03, "{}", back.flux);
         // A focus has no width to weigh.
         let mut parts = [photon(0.5, 0.0); 4];
-        let back = give_back(&mut parts, &photon(0.5, 0.0), 0, 1.0).unwrap();
+        let back = give_back(&mut parts, 0.5 * Vec3::X, Vec3::ZERO, 0).unwrap();
         assert!(back.flux.is_finite() && parts.iter().all(|it| it.flux.is_finite()));
     }
 }

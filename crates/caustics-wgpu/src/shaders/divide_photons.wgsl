@@ -239,11 +239,17 @@ fn divide_record(place: u32) {
         );
         before = strata[part];
     }
-    // What there is too much of on the parts goes back.
+    // What there is too much of on the parts goes back to the cell before them, which is as long as its
+    // neighbour lets it be.
+    let inner_step = -step_in_plane(photon, row.inner.position);
+    var inner_unit = row.side * row.inner.axis;
+    if dot(inner_unit, inner_unit) > LIMIT * LIMIT * dot(inner_step, inner_step) {
+        inner_unit = inner_step;
+    }
     var kept: array<f32, PARTS>;
     for (var part = 0u; part < PARTS; part++) {
         let place = parts[part].position;
-        var sum = even_part(row.inner.position, row.inner.axis, place);
+        var sum = even_part(row.inner.position, inner_unit, place);
         for (var other = 0u; other < PARTS; other++) {
             sum += even_part(parts[other].position, axis_of(parts[other], row.axis), place);
         }
@@ -264,11 +270,11 @@ fn divide_record(place: u32) {
     back.flux_r = flux_back.x;
     back.flux_g = flux_back.y;
     back.flux_b = flux_back.z;
-    back.position = row.inner.position + row.side * GIVE_BACK_SHIFT * row.inner.axis;
+    back.position = row.inner.position + GIVE_BACK_SHIFT * inner_unit;
     if row.axis == 0u {
-        back.axis_u = GIVE_BACK_WIDTH * row.inner.axis;
+        back.axis_u = GIVE_BACK_WIDTH * inner_unit;
     } else {
-        back.axis_v = GIVE_BACK_WIDTH * row.inner.axis;
+        back.axis_v = GIVE_BACK_WIDTH * inner_unit;
     }
     is_sound = is_sound && is_finite_record(back);
     if !is_sound {
