@@ -216,6 +216,10 @@ impl fmt::Debug for Difference {
     }
 }
 
+/// By how much the flux of divided photons may differ in records that are called equal, relative to the
+/// largest that the emitted photon has left: what parts give back is rounded in other orders.
+const GIVEN_BACK: f32 = 1e-5;
+
 impl Difference {
     /// By cause how many photons took another path, and the first of them.
     pub(crate) fn first_of_paths(&self) -> BTreeMap<&'static str, (usize, &[usize])> {
@@ -283,7 +287,17 @@ impl Difference {
         let overlaps = photon.coverage.overlaps();
         self.other_coverages += usize::from(record.coverage().overlaps() != overlaps);
         self.overlaps += usize::from(record.coverage() == Coverage::Overlap);
-        self.equal_records.0 += usize::from(*record == expected);
+        let mut found = *record;
+        if photon.source == FootprintSource::Divided && relative < GIVEN_BACK {
+            let FootprintRecord {
+                flux_r,
+                flux_g,
+                flux_b,
+                ..
+            } = expected;
+            (found.flux_r, found.flux_g, found.flux_b) = (flux_r, flux_g, flux_b);
+        }
+        self.equal_records.0 += usize::from(found == expected);
         self.equal_records.1 += 1;
     }
 
