@@ -97,8 +97,7 @@
 //! Its operations stand in
 //! the order of their CPU twins, so that an adapter that rounds each of them, as software ones do,
 //! gives the same bits: on the ten scenes of the tests all 10⁵ photons each, with their footprints.
-//! Only absorption, the places on exact spheres that shine, and the flux that parts of divided photons give
-//! back differ, in the last digits. Adapters
+//! Only absorption and the places on exact spheres that shine differ, in the last digits. Adapters
 //! that fuse or approximate differ where rounding is amplified, most after many inner reflections.
 //! Triangles stay watertight on all of them; products whose rounding matters are hidden from the
 //! optimiser, and exact spheres are met in pairs of floats.

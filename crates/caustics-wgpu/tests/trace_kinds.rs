@@ -47,15 +47,6 @@ fn hold(
     difference
 }
 
-/// Where an adapter rounds every operation, as software ones do, all bits are the CPU's.
-fn hold_bits(gpu: &Gpu, difference: &Difference, name: &str) {
-    if gpu.0.adapter_info().device_type == wgpu::DeviceType::Cpu {
-        assert_eq!(difference.other_paths(), 0, "{name}");
-        let (equal, all) = difference.equal_records;
-        assert_eq!(equal, all, "{name}");
-    }
-}
-
 fn with_tracer(test: impl Fn(&Gpu, &PhotonTracer)) {
     if let Some((gpu, tracer)) = shared_tracer() {
         test(gpu, tracer);
@@ -175,7 +166,7 @@ fn environments() {
                 };
                 let name = format!("sky {sequence} {seed} {aim:?}");
                 let difference = hold(gpu, tracer, &name, &stage, &options);
-                hold_bits(gpu, &difference, &name);
+                difference.hold_bits(&gpu.0, &name);
                 // Footprints of both kinds: in the light of the sun, and of the rest.
                 let (overlaps, all) = (difference.overlaps, difference.equal_records.1);
                 assert!(10 * overlaps > all && overlaps < all, "{name}: {overlaps}");
@@ -186,7 +177,7 @@ fn environments() {
         let stage = under(scene, sky(7, 5));
         let name = "sky and lamp";
         let difference = hold(gpu, tracer, name, &stage, &options());
-        hold_bits(gpu, &difference, name);
+        difference.hold_bits(&gpu.0, name);
     });
 }
 

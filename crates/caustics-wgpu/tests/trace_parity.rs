@@ -42,6 +42,7 @@ fn the_same_photons_land_in_the_same_places() {
         for (cause, (count, first)) in difference.first_of_paths() {
             println!("  {cause}: {count}, the first {first:?}");
         }
+        difference.hold_bits(&gpu.0, name);
         let ledger = ledger_of(&trails, &plan);
         let of_scene = difference
             .beyond_promise(trails.len())

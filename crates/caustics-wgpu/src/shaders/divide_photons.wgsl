@@ -121,12 +121,13 @@ fn even_part(middle: vec3<f32>, axis: vec3<f32>, place: vec3<f32>) -> f32 {
     if squared == 0.0 {
         return 0.0;
     }
-    let distance = rounded_dot(place - middle, axis) * (1.0 / squared);
-    var power = max(1.0 - rounded(GIVE_BACK_CUT * distance * distance), 0.0);
+    // Constants stay where they are in a product, or what is rounded is another number.
+    let distance = rounded(rounded_dot(place - middle, axis) * (1.0 / squared));
+    var power = max(1.0 - rounded(rounded(GIVE_BACK_CUT * distance) * distance), 0.0);
     for (var i = 0u; i < 7u; i++) {
         power *= power;
     }
-    return rounded(GIVE_BACK_PEAK * power);
+    return rounded(GIVE_BACK_PEAK * rounded(power));
 }
 
 fn is_finite_record(record: FootprintRecord) -> bool {
