@@ -1,8 +1,8 @@
-use std::collections::HashMap;
+use std::ops::Range;
 
 use caustics_accel::{BoxTree, Intersect};
 use caustics_geometry::{Aabb, Ray};
-use caustics_scene::World;
+use caustics_scene::{Object, World};
 use glam::Vec3;
 
 use crate::photon::{Coverage, Photon};
@@ -51,6 +51,8 @@ pub struct BoundaryEdge {
 /// what the footprint lost.
 #[derive(Clone, Debug, Default)]
 pub struct Boundaries {
+    /// For each object its triangles, none if it is no receiver.
+    receivers: Vec<Range<u32>>,
     edges: Vec<BoundaryEdge>,
     /// Where the edges are, and their indices in the order of its places; `None` where there are none.
     tree: Option<(BoxTree, Vec<u32>)>,
@@ -71,14 +73,27 @@ impl Boundaries {
     /// Those of all receivers of a world, in the order of their triangles.
     #[must_use]
     pub fn of(world: &World) -> Self {
+        let receivers = receivers(world);
         let mut edges = Vec::new();
-        for (object, described) in (0u32..).zip(world.objects()) {
-            let surface = &world.materials()[described.material as usize].surface;
-            if surface.brdf().is_some() {
-                let vertices = sharp_edges(world, described.triangles.clone());
-                edges.extend(vertices.map(|vertices| BoundaryEdge { vertices, object }));
-            }
+        for (object, triangles) in (0u32..).zip(&receivers) {
+            let sharp = sharp_edges(world, triangles.clone()).into_iter();
+            edges.extend(sharp.map(|vertices| BoundaryEdge { vertices, object }));
         }
+        Self::placed(world, receivers, edges)
+    }
+
+    /// The same edges in a world that has changed since, or those of that world if it has other objects:
+    /// to find edges takes about as long as to build a hierarchy.
+    pub(crate) fn following(&self, world: &World) -> Self {
+        let receivers = receivers(world);
+        if receivers == self.receivers {
+            Self::placed(world, receivers, self.edges.clone())
+        } else {
+            Self::of(world)
+        }
+    }
+
+    fn placed(world: &World, receivers: Vec<Range<u32>>, edges: Vec<BoundaryEdge>) -> Self {
         let place = |vertex: u32| world.positions()[vertex as usize];
         let ends: Vec<_> = edges.iter().map(|it| it.vertices.map(place)).collect();
         let boxes: Vec<_> = ends
@@ -89,6 +104,7 @@ impl Boundaries {
             })
             .collect();
         Self {
+            receivers,
             edges,
             // A world's positions are finite.
             tree: BoxTree::new(&boxes).ok(),
@@ -145,6 +161,9 @@ impl Boundaries {
                     break;
                 }
             }
+        }
+        if mirrors.is_empty() {
+            return;
         }
         // In a corner each image of one side has one of the other.
         let mut images = vec![*photon];
@@ -209,63 +228,89 @@ impl Mirror {
     }
 }
 
+/// For each object its triangles, none if it is no receiver.
+fn receivers(world: &World) -> Vec<Range<u32>> {
+    let of = |object: &Object| {
+        let surface = &world.materials()[object.material as usize].surface;
+        surface.brdf().map_or(0..0, |_| object.triangles.clone())
+    };
+    world.objects().iter().map(of).collect()
+}
+
 /// How far a footprint reaches in a direction of its plane.
 fn reach(photon: &Photon, direction: Vec3) -> f32 {
     let [a, b] = photon.axes.map(|axis| axis.dot(direction));
     REACH * (a * a + b * b).sqrt()
 }
 
-/// The edges of triangles across which no other triangle goes on smoothly.
-fn sharp_edges(
-    world: &World,
-    triangles: std::ops::Range<u32>,
-) -> impl Iterator<Item = [u32; 2]> + use<> {
-    struct Side {
-        vertices: [u32; 2],
-        normal: Vec3,
-        is_smooth: bool,
-    }
-    let mut sides: Vec<Side> = Vec::new();
-    // By position: meshes have a vertex for each normal.
-    let mut known: HashMap<[[u32; 3]; 2], usize> = HashMap::new();
-    // Both zeros are one place.
-    let key = |vertex: u32| {
-        (world.positions()[vertex as usize] + 0.0)
-            .to_array()
-            .map(f32::to_bits)
+/// The edges of triangles across which no other triangle goes on smoothly, in the order of the triangles.
+fn sharp_edges(world: &World, triangles: Range<u32>) -> Vec<[u32; 2]> {
+    let mut sides: Vec<Side> = triangles
+        .filter_map(|triangle| Some((triangle, world.facet(triangle)?.normal)))
+        .flat_map(|(triangle, normal)| {
+            let [a, b, c] = world.triangles()[triangle as usize];
+            [[a, b], [b, c], [c, a]].map(|vertices| Side { vertices, normal })
+        })
+        .collect();
+    // Most triangles share vertices with those beside them, which is soon known of the others.
+    let by_vertices = |side: &Side| {
+        let [a, b] = side.vertices;
+        [a.min(b), a.max(b)]
     };
-    for triangle in triangles {
-        let Some(facet) = world.facet(triangle) else {
-            continue;
-        };
-        let [a, b, c] = world.triangles()[triangle as usize];
-        for vertices in [[a, b], [b, c], [c, a]] {
-            let mut edge = vertices.map(key);
-            edge.sort_unstable();
-            match known.get(&edge) {
-                Some(&index) => {
-                    let side = &mut sides[index];
-                    side.is_smooth |= side.normal.dot(facet.normal) >= SMOOTH_COSINE;
-                }
-                None => {
-                    known.insert(edge, sides.len());
-                    sides.push(Side {
-                        vertices,
-                        normal: facet.normal,
-                        is_smooth: false,
-                    });
-                }
-            }
-        }
+    sides = kept_of_edges(sides, by_vertices, |edge| {
+        if is_smooth(edge) { 0 } else { edge.len() }
+    });
+    // Where normals differ, each has vertices of its own. Both zeros are one place.
+    let place = |vertex: u32| (world.positions()[vertex as usize] + 0.0).to_array();
+    let by_places = |side: &Side| {
+        let mut ends = side.vertices.map(|it| place(it).map(f32::to_bits));
+        ends.sort_unstable();
+        ends
+    };
+    sides = kept_of_edges(sides, by_places, |edge| usize::from(!is_smooth(edge)));
+    sides.into_iter().map(|side| side.vertices).collect()
+}
+
+/// A side of a triangle.
+#[derive(Clone, Copy)]
+struct Side {
+    vertices: [u32; 2],
+    /// Of the triangle.
+    normal: Vec3,
+}
+
+/// Whether the first of an edge's sides goes on smoothly in another.
+fn is_smooth(edge: &[Side]) -> bool {
+    let mut normals = edge.iter().map(|side| side.normal);
+    normals
+        .next()
+        .is_some_and(|first| normals.any(|it| first.dot(it) >= SMOOTH_COSINE))
+}
+
+/// The sides that stay of edges, which are those of one key: as many of an edge's first as `kept` says, in
+/// the order in which they came.
+fn kept_of_edges<K: Ord>(
+    sides: Vec<Side>,
+    key: impl Fn(&Side) -> K,
+    kept: impl Fn(&[Side]) -> usize,
+) -> Vec<Side> {
+    let mut keyed: Vec<(K, usize, Side)> = (0..)
+        .zip(sides)
+        .map(|(number, side)| (key(&side), number, side))
+        .collect();
+    keyed.sort_unstable_by(|a, b| (&a.0, a.1).cmp(&(&b.0, b.1)));
+    let mut stay = Vec::new();
+    for edge in keyed.chunk_by(|a, b| a.0 == b.0) {
+        let sides: Vec<Side> = edge.iter().map(|it| it.2).collect();
+        stay.extend(edge[..kept(&sides)].iter().map(|it| (it.1, it.2)));
     }
-    let sharp = sides.into_iter().filter(|side| !side.is_smooth);
-    sharp.map(|side| side.vertices)
+    stay.sort_unstable_by_key(|it| it.0);
+    stay.into_iter().map(|it| it.1).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::FootprintSource;
     use caustics_accel::BvhOptions;
     use caustics_geometry::TriangleMesh;
     use caustics_geometry::shapes::{cuboid, disc, quad, uv_sphere};
@@ -294,15 +339,9 @@ mod tests {
 
     fn photon(x: f32, z: f32, axes: [Vec3; 2]) -> Photon {
         Photon {
-            position: Vec3::new(x, 0.0, z),
             incoming: Vec3::new(0.6, -0.8, 0.0),
-            flux: Vec3::ONE,
-            normal: Vec3::Y,
-            axes,
-            object: 0,
-            events: 1,
-            source: FootprintSource::Differential,
             coverage: Coverage::Overlap,
+            ..Photon::landed(Vec3::new(x, 0.0, z), axes)
         }
     }
 
@@ -423,6 +462,32 @@ mod tests {
                 .position
                 .abs_diff_eq(Vec3::new(0.55, 0.5, 0.0), 1e-6)
         );
+    }
+
+    #[test]
+    fn edges_go_along_with_what_moves_and_are_found_anew_on_what_is_new() {
+        let at_the_end = photon(0.1, 0.5, ROUND);
+        let moved = quad(0.2 * Vec3::Y, Vec3::Z, Vec3::X).unwrap();
+        let (_, _, boundaries) = receivers(vec![plate()]);
+        for (mesh, count) in [(moved, 4), (disc(1.0, 64).unwrap(), 64)] {
+            let (world, intersector, anew) = receivers(vec![mesh]);
+            let following = boundaries.following(&world);
+            assert_eq!(following.edges(), anew.edges());
+            assert_eq!(following.edges().len(), count);
+            let images = |boundaries: &Boundaries, y: f32, z: f32| {
+                let mut images = Vec::new();
+                let photon = Photon {
+                    position: Vec3::new(at_the_end.position.x, y, z),
+                    ..at_the_end
+                };
+                boundaries.reflect(&intersector, &photon, |image| images.push(image));
+                images
+            };
+            for (y, z) in [(0.2, 0.5), (0.0, 0.9)] {
+                assert_eq!(images(&following, y, z), images(&anew, y, z));
+            }
+            assert_eq!(images(&following, 0.2, 0.5).len(), usize::from(count == 4));
+        }
     }
 
     #[test]

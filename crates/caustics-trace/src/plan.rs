@@ -94,6 +94,9 @@ impl EmissionPlan {
         let casters = Casters::of(world);
         let emitters = Emitter::all(world, &casters, options.aim);
         let mut plan = Self::weighed(world, intersect, casters, emitters, &[], options);
+        if plan.reflects(options) {
+            plan.boundaries = Arc::new(Boundaries::of(world));
+        }
         plan.share(world, options);
         Ok(plan)
     }
@@ -119,6 +122,9 @@ impl EmissionPlan {
         let before: Vec<&Emitter> = self.batches.iter().map(EmissionBatch::emitter).collect();
         let emitters = Emitter::following(world, &casters, options.aim, &before);
         let mut plan = Self::weighed(world, intersect, casters, emitters, &self.batches, options);
+        if plan.reflects(options) {
+            plan.boundaries = Arc::new(self.boundaries.following(world));
+        }
         let total: u32 = self.batches.iter().map(|batch| batch.share).sum();
         let is_alike = plan.batches.len() == self.batches.len()
             && (total == options.photons || total == 0)
@@ -200,23 +206,25 @@ impl EmissionPlan {
             batch
         };
         #[cfg(feature = "parallel")]
-        let batches: Vec<EmissionBatch> = {
+        let batches = {
             use rayon::prelude::*;
             emitters.into_par_iter().map(weigh).collect()
         };
         #[cfg(not(feature = "parallel"))]
-        let batches: Vec<EmissionBatch> = emitters.into_iter().map(weigh).collect();
-        let may_overlap = batches.iter().any(|batch| batch.emitter.dimensions() > 2);
-        let boundaries = if may_overlap && options.reflect_at_boundaries && options.differentials {
-            Boundaries::of(world)
-        } else {
-            Boundaries::default()
-        };
+        let batches = emitters.into_iter().map(weigh).collect();
         Self {
             casters,
             batches,
-            boundaries: Arc::new(boundaries),
+            boundaries: Arc::default(),
         }
+    }
+
+    /// Whether footprints are reflected where receivers end, as far as any may be.
+    fn reflects(&self, options: &TraceOptions) -> bool {
+        let may_overlap = |batch: &EmissionBatch| batch.emitter.dimensions() > 2;
+        options.reflect_at_boundaries
+            && options.differentials
+            && self.batches.iter().any(may_overlap)
     }
 
     /// What footprints are reflected at; none where they are not.
