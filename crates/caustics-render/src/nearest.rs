@@ -41,6 +41,7 @@ impl Default for NearestOptions {
 /// `L = sum of f_r flux K(d / r) / r²`, with a kernel `K` that integrates to 1 over the unit disc
 /// and the distance `r` of the farthest photon taken (Jensen, *Realistic Image Synthesis Using
 /// Photon Mapping*, 2001, section 7.2). Photons on another side or face do not count.
+/// [Images](caustics_trace::Coverage::Reflected) behind the end of a receiver do, since the disc goes on there.
 #[derive(Clone, Debug)]
 pub struct NearestEstimate<'a> {
     photons: &'a [Photon],

@@ -22,7 +22,8 @@ const HALVINGS: u32 = 4;
 /// parts of it. In steps of two, since the sum of footprints is uneven where their widths differ by
 /// more.
 const STRATA: [(f32, f32); PARTS] = [(0.0, 0.5), (0.5, 0.75), (0.75, 0.875), (0.875, 1.0)];
-const PARTS: usize = 4;
+/// Parts of a divided photon.
+pub(crate) const PARTS: usize = 4;
 
 /// Photons with less than this part of the flux of their cell's brightest are not divided.
 const SIGNIFICANT: f32 = 0.1;
@@ -186,24 +187,25 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             width: 1.0,
             slant: 0.0,
         };
-        let first = divided.len();
-        for (number, stratum) in strata.iter().enumerate() {
-            divided.push(edge.footprint(stratum, &before, strata.get(number + 1)));
-            before = *stratum;
-        }
+        let mut parts: [Photon; PARTS] = std::array::from_fn(|number| {
+            let own = &strata[number];
+            let part = edge.footprint(own, &before, strata.get(number + 1));
+            before = *own;
+            part
+        });
         // As long as its neighbour lets it be.
         let step = -in_plane(photon, inner);
         let mut unit = row.sign * inner.axes[row.axis];
         if unit.length_squared() > LIMIT * LIMIT * step.length_squared() {
             unit = step;
         }
-        let back = give_back(&mut divided[first..], inner.position, unit, row.axis);
-        divided.extend(back);
-        let are_finite = divided[first..]
-            .iter()
-            .all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));
-        if !are_finite {
-            divided.truncate(first);
+        let back = give_back(&mut parts, inner.position, unit, row.axis);
+        let mut all = parts.iter().chain([&back]);
+        let are_finite =
+            all.all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));
+        if are_finite {
+            divided.extend(parts);
+            divided.push(back);
         }
         are_finite
     }

@@ -297,27 +297,13 @@ pub(crate) fn checked(photon: &Photon, neighbours: &[[Option<&Photon>; 2]; 2]) -
 mod tests {
     use super::*;
 
-    fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
-        Photon {
-            position,
-            incoming: Vec3::NEG_Y,
-            flux: Vec3::ONE,
-            normal: Vec3::Y,
-            axes,
-            object: 0,
-            events: 1,
-            source: FootprintSource::Differential,
-            coverage: crate::Coverage::Cell,
-        }
-    }
-
     #[test]
     fn an_axis_is_kept_where_a_neighbour_bears_it_out_and_else_shortened_to_it() {
-        let middle = photon(Vec3::ZERO, [1.4 * Vec3::X, 9.0 * Vec3::Z]);
-        let right = photon(Vec3::X, middle.axes);
-        let left = photon(-0.8 * Vec3::X, middle.axes);
-        let above = photon(0.5 * Vec3::Z + 0.1 * Vec3::Y, middle.axes);
-        let below = photon(-0.25 * Vec3::Z, middle.axes);
+        let middle = Photon::landed(Vec3::ZERO, [1.4 * Vec3::X, 9.0 * Vec3::Z]);
+        let right = Photon::landed(Vec3::X, middle.axes);
+        let left = Photon::landed(-0.8 * Vec3::X, middle.axes);
+        let above = Photon::landed(0.5 * Vec3::Z + 0.1 * Vec3::Y, middle.axes);
+        let below = Photon::landed(-0.25 * Vec3::Z, middle.axes);
         let along = [Some(&left), Some(&right)];
         let found = checked(&middle, &[along, [Some(&below), Some(&above)]]);
         assert_eq!(found.axes, [1.4 * Vec3::X, 0.5 * Vec3::Z]);
@@ -333,27 +319,27 @@ mod tests {
 
     #[test]
     fn between_near_and_far_neighbours_light_reaches_halfway_to_each() {
-        let middle = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
-        let near = photon(-0.1 * Vec3::X, [0.1 * Vec3::X, Vec3::Z]);
-        let far = photon(Vec3::X, middle.axes);
+        let middle = Photon::landed(Vec3::ZERO, [Vec3::X, Vec3::Z]);
+        let near = Photon::landed(-0.1 * Vec3::X, [0.1 * Vec3::X, Vec3::Z]);
+        let far = Photon::landed(Vec3::X, middle.axes);
         let found = checked(&middle, &[[Some(&near), Some(&far)], [None; 2]]);
         assert_eq!(found.position, 0.225 * Vec3::X);
         assert_eq!(found.axes, [0.55 * Vec3::X, Vec3::Z]);
         assert_eq!(found.source, FootprintSource::Neighbour);
         // At a fold both are on one side, and the far one says how far the light goes.
-        let folded = photon(0.1 * Vec3::X, near.axes);
+        let folded = Photon::landed(0.1 * Vec3::X, near.axes);
         let found = checked(&middle, &[[Some(&folded), Some(&far)], [None; 2]]);
         assert_eq!((found.position, found.axes), (middle.position, middle.axes));
         // A short axis is that of the near side, whose light it describes.
-        let short = photon(Vec3::ZERO, near.axes);
+        let short = Photon::landed(Vec3::ZERO, near.axes);
         let found = checked(&short, &[[Some(&near), Some(&far)], [None; 2]]);
         assert_eq!((found.position, found.axes), (short.position, short.axes));
     }
 
     #[test]
     fn the_last_photon_of_even_light_is_drawn_in() {
-        let last = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
-        let inner = photon(-Vec3::X, last.axes);
+        let last = Photon::landed(Vec3::ZERO, [Vec3::X, Vec3::Z]);
+        let inner = Photon::landed(-Vec3::X, last.axes);
         let found = checked(&last, &[[Some(&inner), None], [None; 2]]);
         assert_eq!(found.position, -EDGE_SHIFT * Vec3::X);
         assert_eq!(found.axes, [EDGE_EXTENT * Vec3::X, Vec3::Z]);
@@ -361,11 +347,11 @@ mod tests {
 
     #[test]
     fn light_that_goes_on_past_a_corner_has_no_edge_there() {
-        let last = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
-        let inner = photon(-Vec3::X, last.axes);
+        let last = Photon::landed(Vec3::ZERO, [Vec3::X, Vec3::Z]);
+        let inner = Photon::landed(-Vec3::X, last.axes);
         let beyond = Photon {
             object: 1,
-            ..photon(40.0 * Vec3::Y, last.axes)
+            ..Photon::landed(40.0 * Vec3::Y, last.axes)
         };
         let found = checked(&last, &[[Some(&inner), Some(&beyond)], [None; 2]]);
         assert_eq!((found.position, found.axes), (last.position, last.axes));
@@ -375,7 +361,8 @@ mod tests {
     fn at_a_silhouette_the_footprint_is_where_the_cells_light_lands() {
         // Light that lands at sqrt(x); the photon stands x inside the silhouette, its cell is 1 wide.
         for x in [0.003f32, 0.1, 0.4, 0.9, 3.0] {
-            let at = |x: f32| photon(x.sqrt() * Vec3::X, [Vec3::X / (2.0 * x.sqrt()), Vec3::Z]);
+            let at =
+                |x: f32| Photon::landed(x.sqrt() * Vec3::X, [Vec3::X / (2.0 * x.sqrt()), Vec3::Z]);
             let found = checked(&at(x), &[[None, Some(&at(x + 1.0))], [None; 2]]);
             let low = f64::from(x - 0.5).max(0.0);
             let high = f64::from(x) + 0.5;
@@ -409,7 +396,7 @@ mod tests {
         let at = |x: f32, y: f32| {
             let root = (x + y / 3.0).sqrt();
             let along_x = Vec3::X / (2.0 * root);
-            photon(
+            Photon::landed(
                 root * Vec3::X + y * Vec3::Z,
                 [along_x, along_x / 3.0 + Vec3::Z],
             )
@@ -422,8 +409,8 @@ mod tests {
 
     #[test]
     fn axes_whose_squares_overflow_are_shortened() {
-        let long = photon(Vec3::ZERO, [1e30 * Vec3::X, Vec3::INFINITY]);
-        let near = photon(Vec3::ONE, long.axes);
+        let long = Photon::landed(Vec3::ZERO, [1e30 * Vec3::X, Vec3::INFINITY]);
+        let near = Photon::landed(Vec3::ONE, long.axes);
         let around = [Some(&near), Some(&near)];
         let found = checked(&long, &[around; 2]);
         assert_eq!(found.axes, [Vec3::new(1.0, 0.0, 1.0); 2]);

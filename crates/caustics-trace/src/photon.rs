@@ -28,6 +28,24 @@ pub struct Photon {
     pub coverage: Coverage,
 }
 
+#[cfg(test)]
+impl Photon {
+    /// One of unit flux that fell from above.
+    pub(crate) fn landed(position: Vec3, axes: [Vec3; 2]) -> Self {
+        Self {
+            position,
+            incoming: Vec3::NEG_Y,
+            flux: Vec3::ONE,
+            normal: Vec3::Y,
+            axes,
+            object: 0,
+            events: 1,
+            source: FootprintSource::Differential,
+            coverage: Coverage::Cell,
+        }
+    }
+}
+
 /// How the footprints of neighbouring photons lie to each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
