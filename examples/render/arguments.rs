@@ -35,6 +35,7 @@ usage: render [options] [scene.glb | scene.gltf]
                             silverman                               (epanechnikov)
   --branching NAME          what a photon does at glass: roulette, split-first, split-all
                                                                     (split-all)
+  --emission guided|even    whether more photons go where their footprints would be wide (guided)
   --edges divided|whole     whether photons are divided where sheets of light end (divided)
   --aim NAME                where lights aim: casters, cones around them, everywhere
                                                                     (casters)
@@ -156,6 +157,10 @@ impl Arguments {
             }
             "edges" => {
                 trace.divide_edges = choice(name, parser, &[("divided", true), ("whole", false)])?;
+            }
+            "emission" => {
+                let choices = [("guided", true), ("even", false)];
+                trace.guide_emission = choice(name, parser, &choices)?;
             }
             "aim" => {
                 trace.aim = choice(

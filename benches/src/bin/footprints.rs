@@ -36,6 +36,7 @@ struct Measured {
     overlap_truncations: Vec<Errors>,
     anisotropies: Vec<Errors>,
     kernels: Vec<Errors>,
+    even_emission: Errors,
     whole_edges: Errors,
     unchecked: Errors,
     read_at_middles: Errors,
@@ -110,6 +111,9 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
             ..default
         },
     )?;
+    options.guide_emission = false;
+    let even_emission = errors(&trace(&options)?.photons, &default)?;
+    options.guide_emission = true;
     options.divide_edges = false;
     let whole_edges = errors(&trace(&options)?.photons, &default)?;
     options.check_footprints = false;
@@ -121,6 +125,7 @@ fn measure(scene: &'static str, photons: u32) -> Result<Measured, Failure> {
         overlap_truncations,
         anisotropies,
         kernels,
+        even_emission,
         whole_edges,
         unchecked,
         read_at_middles,
@@ -216,15 +221,29 @@ Every number is the same on any machine.
     )?;
     table(
         &mut text,
-        "Checks",
-        "Without division at the edges of sheets of light (`TraceOptions::divide_edges`), without that and \
+        "Emission and checks",
+        "With photons sent evenly (`TraceOptions::guide_emission`); without division at the edges of sheets of light (`TraceOptions::divide_edges`), without that and \
          the check against neighbours (`TraceOptions::check_footprints`), and, with both, without the \
          integral of small footprints over the pixel (`FootprintOptions::integrate_pixels`).",
-        &["**all**", "edges whole", "unchecked", "read at middles"].map(str::to_owned),
+        &[
+            "**all**",
+            "even emission",
+            "edges whole",
+            "unchecked",
+            "read at middles",
+        ]
+        .map(str::to_owned),
         measured,
         |it| {
             let all = it.scales[SCALES.iter().position(|it| *it == 0.55).unwrap_or(0)];
-            vec![all, it.whole_edges, it.unchecked, it.read_at_middles]
+            let Measured {
+                even_emission,
+                whole_edges,
+                unchecked,
+                read_at_middles,
+                ..
+            } = *it;
+            vec![all, even_emission, whole_edges, unchecked, read_at_middles]
         },
         &of_default,
     )?;

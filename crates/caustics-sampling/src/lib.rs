@@ -37,6 +37,7 @@
 //! | [`Rotation`] | randomises a lattice without changing its distances |
 //! | [`CounterRng`] | random numbers by seed, stream and counter, for Russian roulette |
 //! | [`warp`] | disc, sphere, cone, cosine-weighted hemisphere and triangle |
+//! | [`warp::DensityTable`] | more points where more are wanted, by a table of densities |
 //! | [`DiscreteDistribution`] | picks an entry by weight, such as a triangle by area |
 //! | [`apportion()`] | shares a number of photons exactly among lights |
 //!

@@ -1,5 +1,6 @@
 //! Maps from the unit square to the domains that lights emit from, each of constant or stated
-//! density, with its inverse and its derivatives.
+//! density, with its inverse and its derivatives; and [`DensityTable`], which maps the square to itself by a
+//! density that is measured, and has no inverse here.
 //!
 //! The square is `[0, 1)` on both axes; points outside it are not checked. The derivatives are the
 //! start of a photon's differential, and exact for the map, except where the map is not smooth:
@@ -9,6 +10,7 @@
 
 mod cone;
 mod cosine_hemisphere;
+mod density_table;
 mod disc_concentric;
 mod disc_polar;
 mod sine_cosine;
@@ -18,6 +20,7 @@ mod triangle;
 
 pub use cone::{Cone, ConeError};
 pub use cosine_hemisphere::{cosine_hemisphere_to_square, square_to_cosine_hemisphere};
+pub use density_table::{DensityError, DensityTable};
 pub use disc_concentric::{disc_concentric_to_square, square_to_disc_concentric};
 pub use disc_polar::{disc_polar_to_square, square_to_disc_polar};
 pub use sine_cosine::sine_cosine;

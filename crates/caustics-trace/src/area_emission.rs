@@ -304,7 +304,7 @@ pub(crate) fn emit<const N: usize>(
         return None;
     }
     let area = surface.area(world);
-    let share = 1.0 / sample.count as f32;
+    let share = sample.share();
     let step = share.sqrt();
     let (positions, directions) = match place.derivatives {
         Some(moved) => {

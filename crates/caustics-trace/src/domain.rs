@@ -98,7 +98,7 @@ impl EmissionDomain {
         world: &World,
         sample: &EmissionSample,
     ) -> Option<Emission<N>> {
-        let share = 1.0 / sample.count as f32;
+        let share = sample.share();
         match self {
             Self::Sphere { light, origin } => {
                 let warped = square_to_sphere_octahedral(sample.point);

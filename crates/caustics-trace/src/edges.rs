@@ -3,7 +3,6 @@ use std::ops::Range;
 use caustics_accel::Intersect;
 use glam::Vec2;
 
-use crate::emission::EmissionSample;
 use crate::give_back::give_back;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO, in_plane};
@@ -255,12 +254,9 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         self.tracer.photons.clear();
         self.tracer.paths.clear();
         let planned = self.batch.planned;
-        let mut sample = EmissionSample::without_place(planned.points(), number);
-        sample.point += offset.x * sample.spacing[0] + offset.y * sample.spacing[1];
-        let is_sent = sample.point.cmpge(Vec2::ZERO).all() && sample.point.cmplt(Vec2::ONE).all();
-        let emitter = planned.emitter();
-        let emission = is_sent.then(|| emitter.emit::<2>(self.batch.world, &sample));
-        if let Some(emission) = emission.flatten() {
+        let sample = planned.sample_beside(number, offset);
+        let emission = sample.and_then(|sample| planned.emitter().emit(self.batch.world, &sample));
+        if let Some(emission) = emission {
             let mut random = planned.random(self.batch.options.seed, u64::from(number));
             self.tracer.trace(&emission, planned.media(), &mut random);
         }

@@ -1,5 +1,6 @@
 use caustics_geometry::Ray;
 use caustics_sampling::PointSet;
+use caustics_sampling::warp::DensityTable;
 use glam::{Vec2, Vec3};
 
 use crate::differential::RayDifferential;
@@ -26,6 +27,8 @@ pub struct EmissionSample {
     pub place: Vec2,
     /// Photons that share the domain's flux.
     pub count: u32,
+    /// The size of its cell, relative to an equal share of the domain: 1 where points are evenly spread.
+    pub weight: f32,
 }
 
 impl EmissionSample {
@@ -45,7 +48,28 @@ impl EmissionSample {
             spacing: points.spacing(index),
             place: Vec2::ZERO,
             count: points.count(),
+            weight: 1.0,
         }
+    }
+
+    /// The same sample where points are as dense as a table says.
+    #[must_use]
+    pub fn guided(&self, density: &DensityTable) -> Self {
+        let warped = density.sample(self.point);
+        Self {
+            point: warped.value,
+            spacing: self
+                .spacing
+                .map(|edge| edge.x * warped.d_du + edge.y * warped.d_dv),
+            weight: self.weight * (1.0 / warped.pdf),
+            ..*self
+        }
+    }
+
+    /// Its part of the domain's flux.
+    #[must_use]
+    pub fn share(&self) -> f32 {
+        (1.0 / self.count as f32) * self.weight
     }
 }
 

@@ -1,6 +1,6 @@
+use caustics_sampling::warp::DensityTable;
 use caustics_sampling::{Grid, PointSet, Sequence};
 
-use crate::emission::EmissionSample;
 use crate::projection_map::ProjectionMap;
 
 /// How often the number of points is corrected to that of the marked ones.
@@ -41,16 +41,27 @@ impl Lattice {
         }
     }
 
-    /// The points in marked cells of as large a set as has at most `budget` of them.
-    pub(crate) fn marked(sequence: Sequence, budget: u32, seed: u64, map: &ProjectionMap) -> Self {
-        let coverage = f64::from(map.coverage());
+    /// The points in marked cells of as large a set as has at most `budget` of them; `density` is how
+    /// dense points are in the cells, evenly where there is none.
+    pub(crate) fn marked(
+        sequence: Sequence,
+        budget: u32,
+        seed: u64,
+        map: &ProjectionMap,
+        density: Option<&DensityTable>,
+    ) -> Self {
+        let coverage = match density {
+            Some(density) => map.integral(|at| density.density(at)),
+            None => f64::from(map.coverage()),
+        };
         let mut best: Option<Self> = None;
         let mut size = f64::from(budget) / coverage;
         for _ in 0..CORRECTIONS {
             if !(1.0..=f64::from(u32::MAX)).contains(&size) {
                 break;
             }
-            let lattice = Self::within(PointSet::new(sequence, size as u32, seed), map);
+            let points = PointSet::new(sequence, size as u32, seed);
+            let lattice = Self::within(points, map, density);
             let found = f64::from(lattice.count);
             if lattice.count <= budget {
                 if best.as_ref().is_none_or(|it| lattice.count > it.count) {
@@ -68,8 +79,17 @@ impl Lattice {
         best.unwrap_or_else(|| Self::whole(sequence, budget, seed))
     }
 
-    /// The points of a set that lie in marked cells.
-    pub(crate) fn within(points: PointSet, map: &ProjectionMap) -> Self {
+    /// The points of a set that lie in marked cells, as dense as that says.
+    pub(crate) fn within(
+        points: PointSet,
+        map: &ProjectionMap,
+        density: Option<&DensityTable>,
+    ) -> Self {
+        // Rows of a grid stay rows, and points in them in their order.
+        let place = |number: u32| {
+            let point = points.point(number);
+            density.map_or(point, |it| it.sample(point).value)
+        };
         let mut spans = Vec::new();
         let mut count = 0;
         let mut add = |first: u32, length: u32| {
@@ -81,10 +101,10 @@ impl Lattice {
         };
         if points.sequence() == Sequence::Grid {
             for_each_row(&points, |first, columns| {
-                let row = (points.point(first).y * ProjectionMap::RESOLUTION as f32) as u32;
+                let row = (place(first).y * ProjectionMap::RESOLUTION as f32) as u32;
                 let column_at = |cell: u32| {
                     let edge = cell as f32 / ProjectionMap::RESOLUTION as f32;
-                    partition_point(columns, |column| points.point(first + column).x < edge)
+                    partition_point(columns, |column| place(first + column).x < edge)
                 };
                 for run in map.runs(row) {
                     let (start, end) = (column_at(run.start), column_at(run.end));
@@ -93,7 +113,7 @@ impl Lattice {
             });
         } else {
             for index in 0..points.count() {
-                if map.contains(points.point(index)) {
+                if map.contains(place(index)) {
                     add(index, 1);
                 }
             }
@@ -243,11 +263,6 @@ impl Lattice {
         let index = span.before + (number - span.first);
         let end = spans.get(after).map_or(self.count, |next| next.before);
         (index < end).then_some(index)
-    }
-
-    /// The sample of used point `index`.
-    pub(crate) fn sample(&self, index: u32) -> EmissionSample {
-        EmissionSample::of(&self.points, self.number(index))
     }
 }
 

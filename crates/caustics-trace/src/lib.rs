@@ -62,6 +62,7 @@
 //! | trace them in parts | [`PhotonStream`] | |
 //! | trace only what could meet a caster | [`ProjectionMap`] | Jensen 1996 |
 //! | make a photon from a sample | [`EmissionSample`], [`Emission`] | |
+//! | send photons where their footprints would be wide | [`TraceOptions::guide_emission`], [`EmissionBatch::density`] | Peter, Pietrek 1998 |
 //! | divide photons at the edges of sheets of light | [`TraceOptions::divide_edges`] | |
 //! | give back what footprints spread beyond the ends of receivers | [`TraceOptions::reflect_at_boundaries`], [`Boundaries`], [`BoundaryEdge`], [`Coverage`] | Silverman 1986 |
 //! | know what landed, and how large its footprint is | [`PhotonMap`], [`Photon`] | |
@@ -113,6 +114,7 @@
 //!   Computer Graphics Techniques 2014.
 //! - Igehy, *Tracing Ray Differentials*, SIGGRAPH 1999 (transfer, reflection, refraction).
 //! - Jensen, *Global Illumination using Photon Maps*, Rendering Techniques 1996.
+//! - Peter, Pietrek, *Importance Driven Construction of Photon Maps*, Rendering Techniques 1998.
 //! - Schlick, *An Inexpensive BRDF Model for Physically-based Rendering*, Eurographics 1994.
 //! - Schmidt, Budge, *Simple Nested Dielectrics in Ray Traced Images*, Journal of Graphics Tools
 //!   2002.
@@ -128,8 +130,10 @@ mod domain;
 mod domain_reuse;
 mod edges;
 mod emission;
+mod emission_batch;
 mod emitter;
 mod give_back;
+mod guide;
 mod lattice;
 mod ledger;
 mod live;
@@ -161,6 +165,7 @@ pub use culling::{Culling, SolidAngleLimit, ViewVolume};
 pub use differential::{BLUR_EDGE, RayDifferential};
 pub use domain::EmissionDomain;
 pub use emission::{Emission, EmissionSample};
+pub use emission_batch::EmissionBatch;
 pub use emitter::{Emitter, LightSource};
 pub use glam;
 pub use ledger::{EnergyLedger, Fate, LedgerEntry};
@@ -172,7 +177,7 @@ pub use optics::{
 };
 pub use options::{Aim, Branching, TraceError, TraceOptions};
 pub use photon::{Coverage, FootprintSource, Photon, PhotonMap};
-pub use plan::{EmissionBatch, EmissionPlan};
+pub use plan::EmissionPlan;
 pub use projection_map::ProjectionMap;
 pub use scatter::{Event, Outgoing, Scattering, scatter};
 pub use stream::PhotonStream;

@@ -2,7 +2,6 @@ use caustics_accel::Intersect;
 use caustics_geometry::Aabb;
 use caustics_scene::World;
 
-use crate::emission::EmissionSample;
 use crate::emitter::LightSource;
 use crate::ledger::Fate;
 use crate::live_chunk::{Chunk, Stale};
@@ -335,7 +334,7 @@ fn renewed<I: Intersect + ?Sized, const N: usize>(
             continue;
         }
         traced += 1;
-        let sample = EmissionSample::of(batch.planned.points(), number);
+        let sample = batch.planned.sample_of(number);
         if let Some(trail) = &mut tracer.trail {
             trail.clear();
         }

@@ -84,6 +84,17 @@ impl ProjectionMap {
         self.marked as f32 / (RESOLUTION * RESOLUTION) as f32
     }
 
+    /// The integral of a density over the marked cells, by its values in their middles.
+    pub(crate) fn integral(&self, density: impl Fn(Vec2) -> f32) -> f64 {
+        let middle = |cell: u32| {
+            let cell = glam::UVec2::new(cell % RESOLUTION, cell / RESOLUTION).as_vec2();
+            (cell + 0.5) / RESOLUTION as f32
+        };
+        let marked = (0..RESOLUTION * RESOLUTION).filter(|&cell| self.is_marked(cell));
+        let sum: f64 = marked.map(|cell| f64::from(density(middle(cell)))).sum();
+        sum / f64::from(RESOLUTION * RESOLUTION)
+    }
+
     /// The cells, row by row, 32 to a word with the lowest bit first: 1 for a marked one.
     #[must_use]
     pub fn words(&self) -> &[u32] {

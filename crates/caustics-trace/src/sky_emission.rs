@@ -29,7 +29,7 @@ pub(crate) fn emit<const N: usize>(
     let place = square_to_disc_concentric(sample.point);
     let area = PI * target.radius * target.radius;
     let count = sample.count as f32;
-    let edge = count.sqrt().recip();
+    let edge = count.sqrt().recip() * sample.weight.sqrt();
     let angle = BLUR_EDGE * from.pdf.sqrt().recip();
     let turned = [angle * frame.tangent, angle * frame.bitangent];
     let steps = [edge * across(place.d_du), edge * across(place.d_dv)];
@@ -47,7 +47,7 @@ pub(crate) fn emit<const N: usize>(
             target.center + distance * from.towards + across(place.value),
             -from.towards,
         ),
-        flux: from.radiance * (area / (from.pdf * count)),
+        flux: from.radiance * (area / (from.pdf * count) * sample.weight),
         differential,
     })
 }

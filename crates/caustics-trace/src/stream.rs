@@ -2,10 +2,11 @@ use caustics_accel::Intersect;
 use caustics_scene::World;
 use glam::DVec3;
 
+use crate::emission_batch::EmissionBatch;
 use crate::ledger::Fate;
 use crate::options::{TraceError, TraceOptions};
 use crate::photon::PhotonMap;
-use crate::plan::{EmissionBatch, EmissionPlan};
+use crate::plan::EmissionPlan;
 use crate::trace::Batch;
 use crate::traced::Traced;
 

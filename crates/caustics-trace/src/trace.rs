@@ -6,12 +6,13 @@ use caustics_scene::World;
 use glam::DVec3;
 
 use crate::edges::EdgeTracer;
-use crate::emission::{Emission, EmissionSample};
+use crate::emission::Emission;
+use crate::emission_batch::EmissionBatch;
 use crate::lattice::Lattice;
 use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{Branching, TraceError, TraceOptions};
 use crate::photon::{Photon, PhotonMap};
-use crate::plan::{EmissionBatch, EmissionPlan};
+use crate::plan::EmissionPlan;
 use crate::traced::Traced;
 use crate::tracer::PathTracer;
 use crate::wave::{WAVE, Wave};
@@ -318,12 +319,7 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
     /// A photon as its light sends it, and its random numbers.
     fn emitted<const N: usize>(&self, index: u32) -> Option<(Emission<N>, CounterRng)> {
         let number = self.planned.point_number(index);
-        let points = self.planned.points();
-        let sample = if self.planned.emitter().dimensions() == 2 {
-            EmissionSample::without_place(points, number)
-        } else {
-            EmissionSample::of(points, number)
-        };
+        let sample = self.planned.sample_of(number);
         let emission = self.planned.emitter().emit::<N>(self.world, &sample)?;
         let rng = self.planned.random(self.options.seed, u64::from(number));
         Some((emission, rng))

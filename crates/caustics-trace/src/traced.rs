@@ -3,12 +3,12 @@ use std::ops::Range;
 use caustics_sampling::Sequence;
 use glam::DVec3;
 
+use crate::emission_batch::EmissionBatch;
 use crate::lattice::Lattice;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::LatticePhotons;
 use crate::options::TraceOptions;
 use crate::photon::{FootprintSource, Photon};
-use crate::plan::EmissionBatch;
 
 /// What some points of a light's lattice became.
 #[derive(Clone, Debug, Default)]

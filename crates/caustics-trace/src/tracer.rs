@@ -8,13 +8,13 @@ use crate::boundary::Boundaries;
 use crate::casters::Casters;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
+use crate::emission_batch::EmissionBatch;
 use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::optics::beer_lambert;
 use crate::options::{Branching, TraceOptions};
 use crate::path_guide::{PathGuide, extended, path_landed};
 use crate::photon::{FootprintSource, Photon};
-use crate::plan::EmissionBatch;
 use crate::scatter::{Event, Outgoing, Scattering, scatter};
 use crate::trail::Trail;
 

@@ -71,7 +71,7 @@ proptest! {
         prop_assume!(creases.iter().all(|it| it.abs() > 4.0 * STEP));
         let spacing = [Vec2::new(edges[0], edges[1]), Vec2::new(edges[2], edges[3])];
         prop_assume!(spacing.iter().all(|edge| edge.length() > 0.1));
-        let sample = EmissionSample { point, spacing, place: Vec2::splat(0.5), count: 1000 };
+        let sample = EmissionSample { point, spacing, place: Vec2::splat(0.5), count: 1000, weight: 1.0 };
         let at = |point: Vec2| emitters[0].emit::<2>(&world, &EmissionSample { point, ..sample });
         prop_assume!(at(point).is_some());
         let emission = at(point).expect("just checked");
@@ -122,6 +122,7 @@ proptest! {
             spacing: [Vec2::new(edge, 0.0), Vec2::new(0.0, edge)],
             place: Vec2::splat(0.5),
             count: rows * rows,
+            weight: 1.0,
         };
         let emission = emitters[0].emit::<2>(&world, &sample);
         prop_assume!(emission.is_some());
@@ -154,6 +155,7 @@ proptest! {
             spacing: [Vec2::new(0.1, 0.0), Vec2::new(0.0, 0.1)],
             place: Vec2::new(place.0, place.1),
             count: 100,
+            weight: 1.0,
         };
         let emission = emitters[0].emit::<4>(&world, &sample);
         prop_assume!(emission.is_some());

@@ -66,6 +66,7 @@ fn random_photons(world: &World, emitter: &Emitter, count: u32, seed: u64) -> Ve
                 spacing: [Vec2::X, Vec2::Y],
                 place: rng.next_vec2(),
                 count,
+                weight: 1.0,
             };
             emitter.emit::<4>(world, &sample)
         })
@@ -406,7 +407,7 @@ proptest! {
             let creases = [off.x, off.y, off.x + off.y, off.x - off.y];
             prop_assume!(creases.iter().all(|it| it.abs() > 4.0 * STEP));
         }
-        let sample = EmissionSample { point, spacing: [Vec2::ZERO; 2], place, count };
+        let sample = EmissionSample { point, spacing: [Vec2::ZERO; 2], place, count, weight: 1.0 };
         let emission = emitter.emit::<4>(&world, &sample);
         prop_assume!(emission.is_some());
         let emission = emission.expect("just checked");

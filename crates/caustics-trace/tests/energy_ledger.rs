@@ -197,6 +197,7 @@ fn photons_without_differentials_land_where_those_with_do() {
             let options = TraceOptions {
                 photons: 1000,
                 differentials,
+                guide_emission: false,
                 check_footprints: false,
                 ..TraceOptions::default()
             };

@@ -96,6 +96,7 @@ proptest! {
                     spacing: [Vec2::X, Vec2::Y],
                     place: Vec2::ZERO,
                     count: 1,
+                    weight: 1.0,
                 };
                 let Some(emission) = batch.emitter().emit::<2>(&world, &sample) else { continue };
                 let hit = intersector.closest_hit(&emission.ray);
@@ -121,13 +122,18 @@ fn batch(plan: &EmissionPlan) -> &EmissionBatch {
 #[test]
 fn the_traced_photons_are_those_of_a_whole_lattice() {
     let (world, intersector) = flattened(&ring());
-    for sequence in Sequence::ALL {
+    for (sequence, guide_emission) in Sequence::ALL
+        .into_iter()
+        .flat_map(|it| [(it, false), (it, true)])
+    {
         let options = TraceOptions {
             sequence,
+            guide_emission,
             ..options(Aim::Casters)
         };
         let plan = EmissionPlan::new(&world, &intersector, &options).expect("valid options");
         let mapped = batch(&plan);
+        assert_eq!(mapped.density().is_some(), guide_emission);
         let map = mapped.map().expect("a ring leaves its cone empty");
         // Almost as many as there may be, and never more.
         let least = if sequence == Sequence::Grid {
@@ -147,9 +153,17 @@ fn the_traced_photons_are_those_of_a_whole_lattice() {
             .map(|it| mapped.point_number(it))
             .collect();
         let expected: Vec<u32> = (0..points.count())
-            .filter(|&it| map.contains(points.point(it)))
+            .filter(|&it| {
+                let point = points.point(it);
+                let warped = mapped.density().map(|density| density.sample(point).value);
+                map.contains(warped.unwrap_or(point))
+            })
             .collect();
         assert!(numbers == expected, "{sequence}");
+        if guide_emission {
+            // Other pilots go ahead in the whole cone.
+            continue;
+        }
         // The same caustic, photon by photon, as from the whole lattice in the cone.
         let whole = TraceOptions {
             aim: Aim::Cones,

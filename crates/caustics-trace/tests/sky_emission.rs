@@ -54,6 +54,7 @@ fn random_photons(world: &World, emitter: &Emitter, count: u32, seed: u64) -> Ve
                 spacing: [Vec2::X, Vec2::Y],
                 place: rng.next_vec2(),
                 count,
+                weight: 1.0,
             };
             emitter.emit::<4>(world, &sample)
         })
@@ -194,7 +195,7 @@ proptest! {
         let off = point - Vec2::splat(0.5);
         let creases = [off.x, off.y, off.x + off.y, off.x - off.y];
         prop_assume!(creases.iter().all(|it| it.abs() > 4.0 * STEP));
-        let sample = EmissionSample { point, spacing: [Vec2::ZERO; 2], place, count };
+        let sample = EmissionSample { point, spacing: [Vec2::ZERO; 2], place, count, weight: 1.0 };
         let emission = emitter.emit::<4>(&world, &sample).expect("light from everywhere");
         // Central differences, extrapolated.
         let slope = |at: &dyn Fn(Vec2) -> DVec3, axis: Vec2| -> DVec3 {

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use caustics_geometry::Frame;
-use caustics_sampling::warp::Cone;
+use caustics_sampling::warp::{Cone, DensityTable};
 use caustics_sampling::{CounterRng, Grid, Rank1Lattice, Rotation, Sequence};
 use caustics_scene::{Light, World};
 use caustics_trace::{AreaSurface, EmissionDomain, MediumStack, TraceOptions};
@@ -248,14 +248,16 @@ pub(crate) fn set_media(mirror: &mut Mirror, media: &MediumStack, order: &BodyOr
 }
 
 /// What no photon of the emitter exceeds in any channel, in watts.
-pub(crate) fn largest_flux(mirror: &Mirror) -> f32 {
+pub(crate) fn largest_flux(mirror: &Mirror, density: Option<&DensityTable>) -> f32 {
     let measure = match mirror.kind {
         Mirror::RECTANGLE | Mirror::SKY => mirror.area,
         // The widest cone, and more than the cosine-weighted hemisphere.
         Mirror::AREA => 2.0 * PI * mirror.area,
         _ => mirror.solid_angle,
     };
-    Vec3::from(mirror.intensity).max_element() * measure * mirror.share
+    let densities = density.map_or(&[1.0][..], DensityTable::densities);
+    let least = densities.iter().copied().fold(f32::INFINITY, f32::min);
+    Vec3::from(mirror.intensity).max_element() * measure * (mirror.share / least)
 }
 
 #[cfg(test)]
@@ -315,7 +317,7 @@ mod tests {
                 let emitter = batch.emitter();
                 let mut mirror = mirror(&world, &order, emitter.domain()).unwrap().unwrap();
                 mirror.share = 1.0 / batch.points().count() as f32;
-                let bound = (1.0 + 1e-6) * largest_flux(&mirror);
+                let bound = (1.0 + 1e-6) * largest_flux(&mirror, batch.density());
                 let mut strongest = 0.0f32;
                 for index in 0..batch.count() {
                     let emission = emitter.emit::<4>(&world, &batch.sample(index));

@@ -50,6 +50,10 @@ pub(crate) struct Emitter {
     pub(crate) sky_first: u32,
     pub(crate) sky_width: u32,
     pub(crate) sky_height: u32,
+    pub(crate) first_density: u32,
+    pub(crate) density_cells: u32,
+    pub(crate) unused_a: u32,
+    pub(crate) unused_b: u32,
 }
 
 impl Emitter {

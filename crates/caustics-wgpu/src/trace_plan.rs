@@ -26,7 +26,8 @@ pub(crate) const BOUNDARY_WORDS: u32 = 6;
 #[derive(Clone, Debug)]
 pub struct TracePlan {
     pub(crate) emitters: Vec<PlannedEmitter>,
-    /// What the emitters refer to: cumulative areas, runs of points, projection maps; and boundaries.
+    /// What the emitters refer to: cumulative areas, runs of points, projection maps, densities; and
+    /// boundaries.
     pub(crate) lists: Vec<u32>,
     /// Where in the lists the boundaries begin: for each object where its edges start, where the last
     /// one's end, and the edges' ends.
@@ -91,6 +92,7 @@ impl TracePlan {
             power: DVec3::ZERO,
             photons: 0,
         };
+        let mut strongest = 0.0f32;
         let mut cumulative = HashMap::new();
         for of_light in emission.lights() {
             plan.power += of_light
@@ -117,6 +119,7 @@ impl TracePlan {
                         first
                     });
                 }
+                strongest = strongest.max(largest_flux(&mirror, batch.density()));
                 plan.photons += mirror.count;
                 plan.emitters.push(PlannedEmitter {
                     mirror,
@@ -131,8 +134,6 @@ impl TracePlan {
             // A buffer has at least one word.
             plan.lists.push(0);
         }
-        let fluxes = plan.emitters.iter().map(|it| largest_flux(&it.mirror));
-        let strongest = fluxes.fold(0.0, f32::max);
         if strongest > 0.0 {
             // A power of two, so that scaling does not round.
             plan.flux_scale = (LARGEST_FLUX / strongest).log2().floor().exp2();
@@ -188,6 +189,24 @@ impl TracePlan {
         if let Some(map) = batch.map() {
             mirror.first_map = self.lists.len() as u32;
             self.lists.extend_from_slice(map.words());
+        }
+        if let Some(density) = batch.density() {
+            mirror.first_density = self.lists.len() as u32;
+            mirror.density_cells = density.resolution();
+            let row = density.resolution() as usize + 1;
+            let marginals: Vec<f32> = density
+                .row_integrals()
+                .chunks(row)
+                .map(|it| it[row - 1])
+                .collect();
+            let tables = [
+                &marginals[..],
+                density.cumulative(),
+                density.densities(),
+                density.row_integrals(),
+            ];
+            let words = tables.into_iter().flatten().map(|it| it.to_bits());
+            self.lists.extend(words);
         }
         sample_from(mirror, &self.options);
     }

@@ -71,6 +71,7 @@ macro_rules! pieces {
             shader_piece!("grid"),
             shader_piece!("lattice"),
             shader_piece!("point_set"),
+            shader_piece!("guide"),
             shader_piece!("warp"),
             shader_piece!("warp_inverse"),
             shader_piece!("ray"),
@@ -373,6 +374,10 @@ mod tests {
                 sky_first,
                 sky_width,
                 sky_height,
+                first_density,
+                density_cells,
+                unused_a,
+                unused_b,
             }
         );
         assert_layout!(

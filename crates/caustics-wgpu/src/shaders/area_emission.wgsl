@@ -128,7 +128,7 @@ fn emit_from_area(emitter: u32, sample: EmissionSample) -> Emission {
     }
 
     let area = trace.emitters[emitter].area;
-    let share = trace.emitters[emitter].share;
+    let share = share_of(emitter, sample);
     let step = sqrt(share);
 
     emission.ray = Ray(origin_towards(place.spawn, normal, direction), direction);

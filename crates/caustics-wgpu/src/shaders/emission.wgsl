@@ -39,7 +39,7 @@ fn emit_from_point(emitter: u32, sample: EmissionSample) -> Emission {
     let outer_cosine = trace.emitters[emitter].outer_cosine;
     let cosine = dot(trace.emitters[emitter].spot_axis, emission.ray.direction);
     let falloff = clamp((cosine - outer_cosine) / (inner - outer_cosine), 0.0, 1.0);
-    let solid_angle = trace.emitters[emitter].solid_angle * trace.emitters[emitter].share;
+    let solid_angle = trace.emitters[emitter].solid_angle * share_of(emitter, sample);
     emission.flux = trace.emitters[emitter].intensity * (falloff * falloff) * solid_angle;
     emission.is_valid = any(emission.flux != vec3(0.0));
     for (var i = 0u; i < 2u; i++) {
@@ -58,7 +58,7 @@ fn emit_from_rectangle(emitter: u32, sample: EmissionSample) -> Emission {
         corner + sample.point.x * along + sample.point.y * across,
         trace.emitters[emitter].axis,
     );
-    let area = trace.emitters[emitter].area * trace.emitters[emitter].share;
+    let area = trace.emitters[emitter].area * share_of(emitter, sample);
     emission.flux = trace.emitters[emitter].intensity * area;
     emission.is_valid = true;
     for (var i = 0u; i < 2u; i++) {

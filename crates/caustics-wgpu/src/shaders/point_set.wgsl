@@ -7,6 +7,8 @@ struct EmissionSample {
     spacing: array<vec2<f32>, 2>,
     // Chooses the place on an area light.
     place: vec2<f32>,
+    // The size of its cell, relative to an equal share of the domain.
+    weight: f32,
 }
 
 fn spread_bits(x: u32) -> u32 {
@@ -40,6 +42,7 @@ fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
     let place = trace.emitters[emitter].place;
     let edge = 1.0 / sqrt(f32(count));
     var result: EmissionSample;
+    result.weight = 1.0;
     result.spacing = array(vec2(edge, 0.0), vec2(0.0, edge));
     if trace.sequence == SEQUENCE_GRID {
         let cell = grid_cell(count, trace.emitters[emitter].rows, index);

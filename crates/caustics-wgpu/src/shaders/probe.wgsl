@@ -35,6 +35,6 @@ fn probe(emitter: u32, point: u32, offset: vec2<f32>) {
     var sample = emission_sample(point, emitter);
     sample.point += offset.x * sample.spacing[0] + offset.y * sample.spacing[1];
     if all(sample.point >= vec2(0.0)) && all(sample.point < vec2(1.0)) {
-        send(emitter, point, sample);
+        send(emitter, point, guided(emitter, sample));
     }
 }

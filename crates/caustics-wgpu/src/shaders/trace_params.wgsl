@@ -76,6 +76,12 @@ struct Emitter {
     sky_first: u32,
     sky_width: u32,
     sky_height: u32,
+    // How dense its points are: where that is in `emission_lists`, and cells along each side; none where
+    // they are evenly spread. See guide.wgsl.
+    first_density: u32,
+    density_cells: u32,
+    unused_a: u32,
+    unused_b: u32,
 }
 
 struct TraceParams {

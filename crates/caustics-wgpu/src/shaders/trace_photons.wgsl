@@ -49,7 +49,7 @@ fn trace_photons(
         let point = point_number(emitter, number - trace.emitters[emitter].first);
         photon_number = number;
         last_record = 0u;
-        send(emitter, point, emission_sample(point, emitter));
+        send(emitter, point, guided(emitter, emission_sample(point, emitter)));
         links[slot_of(number)] = last_record;
     }
     workgroupBarrier();
