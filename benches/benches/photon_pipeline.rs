@@ -34,6 +34,7 @@ fn bench_scene(criterion: &mut Criterion, name: &str) -> Result<(), Failure> {
     let trace_whole = || trace_photons(&stage.world, &stage.intersector, &whole_options, &|_| {});
     let mut unchecked_options = whole_options;
     unchecked_options.check_footprints = false;
+    unchecked_options.guide_emission = false;
     let trace_unchecked = || {
         trace_photons(
             &stage.world,

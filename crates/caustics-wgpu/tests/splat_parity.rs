@@ -151,7 +151,7 @@ fn ripples() -> Result<Stage, TestError> {
     scene.add_light(Light::directional([0.78, -0.62, 0.0], [1.0; 3])?)?;
     let eye = [0.05, 0.18, 0.2];
     scene.add_camera(Camera::look_at("within", eye, [0.0; 3], Vec3::Y, 0.8)?)?;
-    Stage::of(&scene, 200_000)
+    Stage::of(&scene, 80_000)
 }
 
 #[test]
