@@ -1,19 +1,17 @@
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
 
 use caustics_accel::{BoxTree, Intersect};
 use caustics_geometry::{Aabb, Ray};
-use caustics_scene::{Object, World};
+use caustics_scene::World;
 use glam::Vec3;
 
 use crate::photon::{Coverage, Photon};
+use crate::sharp_edges::sharp_edges;
 
 /// How far light is followed from a photon to a boundary, in lengths of its axes: three standard
 /// deviations of the default footprint.
 const REACH: f32 = 1.65;
-
-/// The least cosine between the normals of two triangles that are one surface: what a footprint on one
-/// of them lights of the other.
-const SMOOTH_COSINE: f32 = 0.5;
 
 /// How far from a footprint's plane a boundary may lie, relative to how far the footprint reaches, and
 /// the sine of the angle that it may make with the plane.
@@ -51,8 +49,8 @@ pub struct BoundaryEdge {
 /// what the footprint lost.
 #[derive(Clone, Debug, Default)]
 pub struct Boundaries {
-    /// For each object its triangles, none if it is no receiver.
-    receivers: Vec<Range<u32>>,
+    /// Of the receivers that they are of.
+    fingerprint: u64,
     edges: Vec<BoundaryEdge>,
     /// Where the edges are, and their indices in the order of its places; `None` where there are none.
     tree: Option<(BoxTree, Vec<u32>)>,
@@ -73,27 +71,11 @@ impl Boundaries {
     /// Those of all receivers of a world, in the order of their triangles.
     #[must_use]
     pub fn of(world: &World) -> Self {
-        let receivers = receivers(world);
         let mut edges = Vec::new();
-        for (object, triangles) in (0u32..).zip(&receivers) {
-            let sharp = sharp_edges(world, triangles.clone()).into_iter();
+        for (object, triangles) in receivers(world) {
+            let sharp = sharp_edges(world, triangles).into_iter();
             edges.extend(sharp.map(|vertices| BoundaryEdge { vertices, object }));
         }
-        Self::placed(world, receivers, edges)
-    }
-
-    /// The same edges in a world that has changed since, or those of that world if it has other objects:
-    /// to find edges takes about as long as to build a hierarchy.
-    pub(crate) fn following(&self, world: &World) -> Self {
-        let receivers = receivers(world);
-        if receivers == self.receivers {
-            Self::placed(world, receivers, self.edges.clone())
-        } else {
-            Self::of(world)
-        }
-    }
-
-    fn placed(world: &World, receivers: Vec<Range<u32>>, edges: Vec<BoundaryEdge>) -> Self {
         let place = |vertex: u32| world.positions()[vertex as usize];
         let ends: Vec<_> = edges.iter().map(|it| it.vertices.map(place)).collect();
         let boxes: Vec<_> = ends
@@ -104,12 +86,17 @@ impl Boundaries {
             })
             .collect();
         Self {
-            receivers,
+            fingerprint: fingerprint(world),
             edges,
             // A world's positions are finite.
             tree: BoxTree::new(&boxes).ok(),
             ends,
         }
+    }
+
+    /// Whether they are those of a world, but for one chance in 2⁶⁴ where receivers have changed.
+    pub(crate) fn are_of(&self, world: &World) -> bool {
+        self.fingerprint == fingerprint(world)
     }
 
     /// The edges.
@@ -228,84 +215,36 @@ impl Mirror {
     }
 }
 
-/// For each object its triangles, none if it is no receiver.
-fn receivers(world: &World) -> Vec<Range<u32>> {
-    let of = |object: &Object| {
+/// The objects that are receivers, and their triangles.
+fn receivers(world: &World) -> impl Iterator<Item = (u32, Range<u32>)> {
+    let objects = (0u32..).zip(world.objects());
+    let are_lit = objects.filter(|(_, object)| {
         let surface = &world.materials()[object.material as usize].surface;
-        surface.brdf().map_or(0..0, |_| object.triangles.clone())
-    };
-    world.objects().iter().map(of).collect()
+        surface.brdf().is_some()
+    });
+    are_lit.map(|(number, object)| (number, object.triangles.clone()))
+}
+
+/// Another number for other receivers.
+fn fingerprint(world: &World) -> u64 {
+    // The same in every run.
+    let mut hasher = DefaultHasher::new();
+    for (object, triangles) in receivers(world) {
+        (object, triangles.start, triangles.end).hash(&mut hasher);
+        for triangle in triangles {
+            for vertex in world.triangles()[triangle as usize] {
+                let place = world.positions()[vertex as usize].to_array();
+                (vertex, place.map(f32::to_bits)).hash(&mut hasher);
+            }
+        }
+    }
+    hasher.finish()
 }
 
 /// How far a footprint reaches in a direction of its plane.
 fn reach(photon: &Photon, direction: Vec3) -> f32 {
     let [a, b] = photon.axes.map(|axis| axis.dot(direction));
     REACH * (a * a + b * b).sqrt()
-}
-
-/// The edges of triangles across which no other triangle goes on smoothly, in the order of the triangles.
-fn sharp_edges(world: &World, triangles: Range<u32>) -> Vec<[u32; 2]> {
-    let mut sides: Vec<Side> = triangles
-        .filter_map(|triangle| Some((triangle, world.facet(triangle)?.normal)))
-        .flat_map(|(triangle, normal)| {
-            let [a, b, c] = world.triangles()[triangle as usize];
-            [[a, b], [b, c], [c, a]].map(|vertices| Side { vertices, normal })
-        })
-        .collect();
-    // Most triangles share vertices with those beside them, which is soon known of the others.
-    let by_vertices = |side: &Side| {
-        let [a, b] = side.vertices;
-        [a.min(b), a.max(b)]
-    };
-    sides = kept_of_edges(sides, by_vertices, |edge| {
-        if is_smooth(edge) { 0 } else { edge.len() }
-    });
-    // Where normals differ, each has vertices of its own. Both zeros are one place.
-    let place = |vertex: u32| (world.positions()[vertex as usize] + 0.0).to_array();
-    let by_places = |side: &Side| {
-        let mut ends = side.vertices.map(|it| place(it).map(f32::to_bits));
-        ends.sort_unstable();
-        ends
-    };
-    sides = kept_of_edges(sides, by_places, |edge| usize::from(!is_smooth(edge)));
-    sides.into_iter().map(|side| side.vertices).collect()
-}
-
-/// A side of a triangle.
-#[derive(Clone, Copy)]
-struct Side {
-    vertices: [u32; 2],
-    /// Of the triangle.
-    normal: Vec3,
-}
-
-/// Whether the first of an edge's sides goes on smoothly in another.
-fn is_smooth(edge: &[Side]) -> bool {
-    let mut normals = edge.iter().map(|side| side.normal);
-    normals
-        .next()
-        .is_some_and(|first| normals.any(|it| first.dot(it) >= SMOOTH_COSINE))
-}
-
-/// The sides that stay of edges, which are those of one key: as many of an edge's first as `kept` says, in
-/// the order in which they came.
-fn kept_of_edges<K: Ord>(
-    sides: Vec<Side>,
-    key: impl Fn(&Side) -> K,
-    kept: impl Fn(&[Side]) -> usize,
-) -> Vec<Side> {
-    let mut keyed: Vec<(K, usize, Side)> = (0..)
-        .zip(sides)
-        .map(|(number, side)| (key(&side), number, side))
-        .collect();
-    keyed.sort_unstable_by(|a, b| (&a.0, a.1).cmp(&(&b.0, b.1)));
-    let mut stay = Vec::new();
-    for edge in keyed.chunk_by(|a, b| a.0 == b.0) {
-        let sides: Vec<Side> = edge.iter().map(|it| it.2).collect();
-        stay.extend(edge[..kept(&sides)].iter().map(|it| (it.1, it.2)));
-    }
-    stay.sort_unstable_by_key(|it| it.0);
-    stay.into_iter().map(|it| it.1).collect()
 }
 
 #[cfg(test)]
@@ -465,28 +404,25 @@ mod tests {
     }
 
     #[test]
-    fn edges_go_along_with_what_moves_and_are_found_anew_on_what_is_new() {
-        let at_the_end = photon(0.1, 0.5, ROUND);
-        let moved = quad(0.2 * Vec3::Y, Vec3::Z, Vec3::X).unwrap();
-        let (_, _, boundaries) = receivers(vec![plate()]);
-        for (mesh, count) in [(moved, 4), (disc(1.0, 64).unwrap(), 64)] {
-            let (world, intersector, anew) = receivers(vec![mesh]);
-            let following = boundaries.following(&world);
-            assert_eq!(following.edges(), anew.edges());
-            assert_eq!(following.edges().len(), count);
-            let images = |boundaries: &Boundaries, y: f32, z: f32| {
-                let mut images = Vec::new();
-                let photon = Photon {
-                    position: Vec3::new(at_the_end.position.x, y, z),
-                    ..at_the_end
-                };
-                boundaries.reflect(&intersector, &photon, |image| images.push(image));
-                images
-            };
-            for (y, z) in [(0.2, 0.5), (0.0, 0.9)] {
-                assert_eq!(images(&following, y, z), images(&anew, y, z));
-            }
-            assert_eq!(images(&following, 0.2, 0.5).len(), usize::from(count == 4));
+    fn other_receivers_have_other_boundaries() {
+        let (world, _, boundaries) = receivers(vec![plate()]);
+        assert!(boundaries.are_of(&world));
+        let (again, ..) = receivers(vec![plate()]);
+        assert!(boundaries.are_of(&again));
+        // As many triangles, of which one has moved, one is cut the other way, or whose ends are apart.
+        let moved = quad(1e-3 * Vec3::Y, Vec3::Z, Vec3::X).unwrap();
+        let turned = quad(Vec3::X, -Vec3::X, Vec3::Z).unwrap();
+        let triangle = |at: f32| {
+            let corners = [at * Vec3::X, at * Vec3::X + Vec3::Z, (at + 1.0) * Vec3::X];
+            TriangleMesh::new(corners.to_vec(), None, vec![[0, 1, 2]]).unwrap()
+        };
+        for other in [
+            vec![moved],
+            vec![turned],
+            vec![triangle(0.0), triangle(3.0)],
+        ] {
+            let (world, ..) = receivers(other);
+            assert!(!boundaries.are_of(&world));
         }
     }
 

@@ -8,7 +8,6 @@ use caustics_scene::World;
 use glam::Vec2;
 
 use crate::casters::Casters;
-use crate::culling::Culling;
 use crate::emission::EmissionSample;
 use crate::emitter::Emitter;
 use crate::guide;
@@ -207,11 +206,6 @@ impl EmissionBatch {
         options: &TraceOptions,
         pilots: u32,
     ) {
-        // A camera that turns moves no photons.
-        let options = &TraceOptions {
-            culling: Culling::default(),
-            ..*options
-        };
         let ledger = if self.emitter.dimensions() == 2 {
             self.pilots::<I, 2>(world, intersect, casters, options, pilots)
         } else {
@@ -237,16 +231,38 @@ impl EmissionBatch {
         pilots: u32,
     ) -> EnergyLedger {
         let points = PointSet::new(Sequence::Halton, pilots, 0);
-        let aimed = self.emitter.caster().map(|caster| (casters, caster));
-        let mut tracer = PathTracer::<I, N>::new(world, intersect, options).aimed_at(aimed, &[]);
+        let mut tracer = self.pilot_tracer::<I, N>(world, intersect, casters, options);
         for index in 0..pilots {
-            let sample = EmissionSample::of(&points, index);
-            if let Some(emission) = self.emitter.emit::<N>(world, &sample) {
-                let mut rng = self.random(0, u64::from(index));
-                tracer.trace(&emission, self.media, &mut rng);
-            }
+            self.send_pilot(&mut tracer, world, &points, index);
         }
         tracer.ledger
+    }
+
+    /// A tracer of photons that go ahead of the others.
+    pub(crate) fn pilot_tracer<'a, I: Intersect + ?Sized, const N: usize>(
+        &self,
+        world: &'a World,
+        intersect: &'a I,
+        casters: &'a Casters,
+        options: &'a TraceOptions,
+    ) -> PathTracer<'a, I, N> {
+        let aimed = self.emitter.caster().map(|caster| (casters, caster));
+        PathTracer::new(world, intersect, options).aimed_at(aimed, &[])
+    }
+
+    /// Traces one of them, from a point of a set of their own.
+    pub(crate) fn send_pilot<I: Intersect + ?Sized, const N: usize>(
+        &self,
+        tracer: &mut PathTracer<'_, I, N>,
+        world: &World,
+        points: &PointSet,
+        index: u32,
+    ) {
+        let sample = EmissionSample::of(points, index);
+        if let Some(emission) = self.emitter.emit::<N>(world, &sample) {
+            let mut random = self.random(0, u64::from(index));
+            tracer.trace(&emission, self.media, &mut random);
+        }
     }
 
     /// The projection map, where drawing it costs less than it saves: photons that would miss.
@@ -296,7 +312,7 @@ impl EmissionBatch {
         casters: &Casters,
         options: &TraceOptions,
     ) {
-        let density = guide::density(world, intersect, casters, self, self.share, options);
+        let density = guide::density(world, intersect, casters, self, options);
         self.density = density.map(Arc::new);
     }
 
@@ -320,7 +336,8 @@ impl EmissionBatch {
         options: &TraceOptions,
     ) {
         self.share = old.share;
-        if old.emitter.domain() == self.emitter.domain() {
+        let is_still = old.emitter.domain() == self.emitter.domain();
+        if is_still && old.density.is_some() && guide::is_wanted(self, options) {
             self.density.clone_from(&old.density);
         } else {
             self.guide(world, intersect, casters, options);

@@ -4,13 +4,10 @@ use caustics_sampling::{PointSet, Sequence};
 use caustics_scene::World;
 
 use crate::casters::Casters;
-use crate::culling::Culling;
 use crate::domain::EmissionDomain;
-use crate::emission::EmissionSample;
 use crate::emission_batch::EmissionBatch;
 use crate::options::TraceOptions;
 use crate::photon::Photon;
-use crate::tracer::PathTracer;
 
 /// One of so many photons may go ahead.
 const PILOT_PART: u32 = 12;
@@ -24,8 +21,8 @@ const LEAST_SIDE: u32 = 8;
 /// Pilots along each axis of a cell of the table.
 const SIDE_OF_CELL: u32 = 2;
 
-/// Footprints that are wider than this part of all count as wide as those at it: what lands far away, or at
-/// a grazing angle, is no more worth.
+/// Footprints that are wider than this part of all count as wide as that one: what lands far away, or at a
+/// grazing angle, is not worth so many photons.
 const WIDEST: f64 = 0.9;
 
 /// Irradiance that counts for half, relative to the mean of all footprints.
@@ -60,48 +57,44 @@ impl Landing {
     }
 }
 
+/// Whether an emitter's photons are guided, as far as there are enough of them. An environment's are chosen by
+/// its picture.
+pub(crate) fn is_wanted(batch: &EmissionBatch, options: &TraceOptions) -> bool {
+    let is_sky = matches!(batch.emitter().domain(), EmissionDomain::Sky { .. });
+    options.guide_emission && options.differentials && batch.emitter().caster().is_some() && !is_sky
+}
+
 /// How dense the points of an emitter's photons should be over its unit square; `None` where that is not
-/// worth finding out.
+/// to be found out.
 ///
 /// Points that are evenly spread light some places by thousands of photons a pixel and leave others,
 /// such as what a ball's rim throws far around, to one photon for hundreds. With n photons where
 /// there would be one, a footprint of area A covers A / n, and what the light does within it is lost.
 /// With an error in proportion to the area that a footprint covers, or any other power of it, the
-/// sum of all errors for a given number of photons is least where footprints are equally large: n in proportion to A. A few pilots
-/// tell A, of which the longer axis' square is taken, since thin footprints cannot be cut along their length
-/// alone. Light that is dim beside the mean counts less, as it does in a relative error.
+/// sum of all errors for a given number of photons is least where footprints are equally large: n in
+/// proportion to A. A few pilots tell A, of which the longer axis' square is taken, since thin
+/// footprints cannot be cut along their length alone. Light that is dim beside the mean counts less, as
+/// it does in a relative error.
 ///
-/// The density is the root of that, which loses little where it is right and little where it is wrong, and
-/// it changes slowly, so that the cells of the lattice stay about as large as their neighbours and their
-/// footprints side by side.
+/// The density is the root of that, by measurement: where the pilots are right it gains less, and where they
+/// are wrong, as at folds, it loses less. It changes slowly, so that the cells of the lattice stay about as
+/// large as their neighbours and their footprints side by side.
 pub(crate) fn density<I: Intersect + ?Sized>(
     world: &World,
     intersect: &I,
     casters: &Casters,
     batch: &EmissionBatch,
-    photons: u32,
     options: &TraceOptions,
 ) -> Option<DensityTable> {
-    let side = f64::from(photons / PILOT_PART).sqrt() as u32;
+    let side = f64::from(batch.share / PILOT_PART).sqrt() as u32;
     let side = side.min(MAX_SIDE) / SIDE_OF_CELL * SIDE_OF_CELL;
-    let is_even = matches!(batch.emitter().domain(), EmissionDomain::Sky { .. });
-    let is_worth_it = options.guide_emission
-        && options.differentials
-        && batch.emitter().caster().is_some()
-        && !is_even
-        && side >= LEAST_SIDE;
-    if !is_worth_it {
+    if side < LEAST_SIDE || !is_wanted(batch, options) {
         return None;
     }
-    // A camera that turns moves no photons.
-    let options = TraceOptions {
-        culling: Culling::default(),
-        ..*options
-    };
     let landings = if batch.emitter().dimensions() == 2 {
-        landings::<I, 2>(world, intersect, casters, batch, side, &options)
+        landings::<I, 2>(world, intersect, casters, batch, side, options)
     } else {
-        landings::<I, 4>(world, intersect, casters, batch, side, &options)
+        landings::<I, 4>(world, intersect, casters, batch, side, options)
     };
     table(side, &landings)
 }
@@ -116,16 +109,11 @@ fn landings<I: Intersect + ?Sized, const N: usize>(
     options: &TraceOptions,
 ) -> Vec<Vec<Landing>> {
     let points = PointSet::new(Sequence::Grid, side * side, 0);
-    let aimed = batch.emitter().caster().map(|caster| (casters, caster));
     let of_row = |row: u32| -> Vec<Vec<Landing>> {
-        let mut tracer = PathTracer::<I, N>::new(world, intersect, options).aimed_at(aimed, &[]);
+        let mut tracer = batch.pilot_tracer::<I, N>(world, intersect, casters, options);
         let of_pilot = |index: u32| {
             tracer.photons.clear();
-            let sample = EmissionSample::of(&points, index);
-            if let Some(emission) = batch.emitter().emit::<N>(world, &sample) {
-                let mut random = batch.random(0, u64::from(index));
-                tracer.trace(&emission, batch.media(), &mut random);
-            }
+            batch.send_pilot(&mut tracer, world, &points, index);
             tracer.photons.iter().filter_map(Landing::of).collect()
         };
         (row * side..(row + 1) * side).map(of_pilot).collect()
@@ -201,7 +189,7 @@ fn smoothed(cells: i32, values: &[f32]) -> Vec<f32> {
 fn limit_steps(width: usize, values: &mut [f32]) {
     let count = values.len();
     let mut raise = |at: usize, by: usize| values[at] = values[at].max(values[by] / MAX_STEP);
-    // Whatever way leads from one to another, those up and left of it come first, or those down and right.
+    // Two passes do: a way to the right or down is taken in the first, its rest up or left in the second.
     for at in 0..count {
         if at % width > 0 {
             raise(at, at - 1);

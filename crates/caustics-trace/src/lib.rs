@@ -148,6 +148,7 @@ mod photon;
 mod plan;
 mod projection_map;
 mod scatter;
+mod sharp_edges;
 mod silhouette;
 mod sky_emission;
 mod stream;

@@ -210,6 +210,7 @@ impl LivePhotons {
             let same_rays = old.emitter().domain() == new.emitter().domain()
                 && source == old.emitter().source()
                 && old.points() == new.points()
+                && old.density() == new.density()
                 && old.media() == new.media();
             stale.push(Stale {
                 all: !same_rays,

@@ -6,6 +6,7 @@ use caustics_scene::World;
 
 use crate::boundary::Boundaries;
 use crate::casters::Casters;
+use crate::culling::Culling;
 use crate::emission_batch::EmissionBatch;
 use crate::emitter::Emitter;
 use crate::options::{Aim, TraceError, TraceOptions};
@@ -46,6 +47,7 @@ impl EmissionPlan {
         options: &TraceOptions,
     ) -> Result<Self, TraceError> {
         options.validate()?;
+        let options = &unculled(options);
         let casters = Casters::of(world);
         let emitters = Emitter::all(world, &casters, options.aim);
         let mut plan = Self::weighed(world, intersect, casters, emitters, &[], options);
@@ -73,12 +75,18 @@ impl EmissionPlan {
         options: &TraceOptions,
     ) -> Result<Self, TraceError> {
         options.validate()?;
+        let options = &unculled(options);
         let casters = Casters::of(world);
         let before: Vec<&Emitter> = self.batches.iter().map(EmissionBatch::emitter).collect();
         let emitters = Emitter::following(world, &casters, options.aim, &before);
         let mut plan = Self::weighed(world, intersect, casters, emitters, &self.batches, options);
         if plan.reflects(options) {
-            plan.boundaries = Arc::new(self.boundaries.following(world));
+            // To find them takes half as long as to build a hierarchy.
+            plan.boundaries = if self.boundaries.are_of(world) {
+                self.boundaries.clone()
+            } else {
+                Arc::new(Boundaries::of(world))
+            };
         }
         let total: u32 = self.batches.iter().map(|batch| batch.share).sum();
         let is_alike = plan.batches.len() == self.batches.len()
@@ -208,6 +216,14 @@ impl EmissionPlan {
         }
         #[cfg(not(feature = "parallel"))]
         self.batches.iter_mut().zip(shares).for_each(settle);
+    }
+}
+
+/// The same photons whatever the camera sees: one that turns moves none.
+fn unculled(options: &TraceOptions) -> TraceOptions {
+    TraceOptions {
+        culling: Culling::default(),
+        ..*options
     }
 }
 

@@ -154,4 +154,22 @@ fn densities_stay_while_rays_do() {
     for index in 0..before.count() {
         assert_eq!(before.sample(index), after.sample(index));
     }
+    // But not where they are no longer asked for.
+    let (world, rays) = ball(0.021, lights()[0]);
+    for unguided in [
+        self::options(false),
+        TraceOptions {
+            differentials: false,
+            ..options
+        },
+    ] {
+        let even = next
+            .following(&world, &rays, &unguided)
+            .expect("valid options");
+        assert_eq!(even.batches()[0].density(), None);
+        let guided = even
+            .following(&world, &rays, &options)
+            .expect("valid options");
+        assert!(guided.batches()[0].density().is_some());
+    }
 }
