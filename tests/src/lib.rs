@@ -39,6 +39,7 @@ pub mod optics;
 pub mod oracles;
 pub mod pictures;
 pub mod pixel_sum;
+pub mod scored;
 pub mod stage;
 
 /// Whatever may go wrong in a test.

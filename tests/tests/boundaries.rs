@@ -1,12 +1,10 @@
 //! Where receivers end: light of a lamp with an area, in a box that is open at its front, against an
 //! independent tracer's picture.
 
-use caustics::accel::BvhOptions;
-use caustics::filter::{Comparison, Image};
-use caustics::render::{FootprintOptions, GBuffer, splat};
-use caustics::scene::World;
-use caustics::trace::{Coverage, PhotonMap, TraceOptions, trace_photons};
-use caustics_tests::{TestError, gallery};
+use caustics::filter::Image;
+use caustics::trace::{Coverage, PhotonMap, TraceOptions};
+use caustics_tests::TestError;
+use caustics_tests::scored::ScoredScene;
 
 const SIZE: u32 = 512;
 
@@ -32,23 +30,14 @@ fn frame(picture: &Image, reference: &Image) -> f64 {
 
 #[test]
 fn walls_are_as_bright_at_their_ends_as_they_should_be() -> Result<(), TestError> {
-    let name = "p09_cornell";
-    let scene = gallery::load(name)?;
-    let reference = gallery::reference(name, 1)?;
-    let world = World::new(&scene)?;
-    let rays = world.intersector(&BvhOptions::default())?;
-    let buffer = GBuffer::new(&world, &rays, &scene.cameras()[0], SIZE, SIZE)?;
+    let scene = ScoredScene::load("p09_cornell")?;
     let trace = |reflect_at_boundaries: bool| -> Result<PhotonMap, TestError> {
         let options = TraceOptions {
             photons: 1 << 16,
             reflect_at_boundaries,
             ..TraceOptions::default()
         };
-        Ok(trace_photons(&world, &rays, &options, &|_| {})?)
-    };
-    let draw = |map: &PhotonMap| -> Result<Image, TestError> {
-        let (picture, _) = splat(&buffer, &map.photons, &FootprintOptions::default())?;
-        Ok(picture)
+        scene.trace(&options)
     };
     let (with, without) = (trace(true)?, trace(false)?);
 
@@ -58,17 +47,20 @@ fn walls_are_as_bright_at_their_ends_as_they_should_be() -> Result<(), TestError
     own.retain(|photon| photon.coverage != Coverage::Reflected);
     assert!(own == without.photons && own.len() < with.photons.len());
 
-    let (reflected, plain) = (draw(&with)?, draw(&without)?);
-    let at_ends = [&reflected, &plain].map(|it| frame(it, &reference));
+    let (reflected, plain) = (
+        scene.picture(&with.photons)?,
+        scene.picture(&without.photons)?,
+    );
+    let at_ends = [&reflected, &plain].map(|it| frame(it, &scene.reference));
     println!("at the ends {at_ends:?} of the light");
     assert!(
         (at_ends[0] - 1.0).abs() < 0.04 && at_ends[1] < 0.8,
         "{at_ends:?}"
     );
-    let error = |picture: &Image| -> Result<f64, TestError> {
-        Ok(Comparison::new(picture, &reference)?.relative_mse)
-    };
-    let errors = [error(&reflected)?, error(&plain)?];
+    let errors = [
+        scene.score(&reflected)?.relative_mse,
+        scene.score(&plain)?.relative_mse,
+    ];
     println!("relMSE {errors:?}");
     assert!(errors[0] < 0.85 * errors[1], "{errors:?}");
     Ok(())

@@ -1,33 +1,23 @@
 //! Where sheets of light end: dividing the last photons of a lattice's rows against an independent
 //! tracer's pictures.
 
-use caustics::accel::BvhOptions;
-use caustics::render::{FootprintOptions, GBuffer, splat};
-use caustics::scene::World;
-use caustics::trace::{TraceOptions, trace_photons};
-use caustics_filter::Comparison;
-use caustics_tests::{TestError, gallery};
-
-const SIZE: u32 = 512;
+use caustics::trace::TraceOptions;
+use caustics_tests::TestError;
+use caustics_tests::scored::ScoredScene;
 
 #[test]
 fn divided_photons_have_less_than_half_the_error_where_light_ends_in_the_dark()
 -> Result<(), TestError> {
     for name in ["p01_sphere", "p05_brass_ring", "p10_torus_cube"] {
-        let scene = gallery::load(name)?;
-        let reference = gallery::reference(name, 1)?;
-        let world = World::new(&scene)?;
-        let rays = world.intersector(&BvhOptions::default())?;
-        let buffer = GBuffer::new(&world, &rays, &scene.cameras()[0], SIZE, SIZE)?;
+        let scene = ScoredScene::load(name)?;
         let error = |divide_edges: bool| -> Result<(f64, u64), TestError> {
             let options = TraceOptions {
                 photons: 1 << 16,
                 divide_edges,
                 ..TraceOptions::default()
             };
-            let map = trace_photons(&world, &rays, &options, &|_| {})?;
-            let (picture, _) = splat(&buffer, &map.photons, &FootprintOptions::default())?;
-            let error = Comparison::new(&picture, &reference)?.relative_mse;
+            let map = scene.trace(&options)?;
+            let error = scene.score(&scene.picture(&map.photons)?)?.relative_mse;
             Ok((error, map.ledger.rays))
         };
         let ((divided, more_rays), (whole, rays)) = (error(true)?, error(false)?);

@@ -222,9 +222,10 @@ Every number is the same on any machine.
     table(
         &mut text,
         "Emission and checks",
-        "With photons sent evenly (`TraceOptions::guide_emission`); without division at the edges of sheets of light (`TraceOptions::divide_edges`), without that and \
-         the check against neighbours (`TraceOptions::check_footprints`), and, with both, without the \
-         integral of small footprints over the pixel (`FootprintOptions::integrate_pixels`).",
+        "With photons sent evenly (`TraceOptions::guide_emission`); without division at the edges of sheets of \
+         light (`TraceOptions::divide_edges`), without that and the check against neighbours \
+         (`TraceOptions::check_footprints`), and, with both, without the integral of small footprints over \
+         the pixel (`FootprintOptions::integrate_pixels`).",
         &[
             "**all**",
             "even emission",

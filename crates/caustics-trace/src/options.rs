@@ -73,14 +73,14 @@ pub struct TraceOptions {
     /// Whether the last photons of a lattice's rows are divided, where a sheet of light ends: a few more
     /// rays find where, and what of the cell is left is traced in parts. Edges become sharp and stand
     /// where they are, and what lands near a silhouette is where it is: without, the error of the ten
-    /// scenes of `docs/footprints.md` is 2.3 times as large in the mean. It takes a fourteenth to a half
+    /// scenes of `docs/footprints.md` is 2.3 times as large in the mean. It takes a twentieth to a half
     /// more rays there at 262,144 photons, and less where there are more. It needs
     /// [`check_footprints`](Self::check_footprints) and [`Branching::SplitAll`], and does nothing without.
     pub divide_edges: bool,
     /// Whether footprints that [overlap](crate::Coverage::Overlap) are reflected where their receiver ends, so
     /// that what they spread beyond comes back: see [`Boundaries`](crate::Boundaries). Without, receivers are up
     /// to half too dark along their ends. In the Cornell box of `docs/accuracy.md` that halves the error without
-    /// the reference's noise at two million photons, for 2 to 6 % more footprints.
+    /// the reference's noise at two million photons, for 2 to 7 % more footprints.
     pub reflect_at_boundaries: bool,
     /// Whether photons carry differentials. Without, their footprints have no axes and nothing tells where
     /// more of them are wanted ([`guide_emission`](Self::guide_emission)): enough for estimates from the

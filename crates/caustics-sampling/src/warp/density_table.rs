@@ -45,9 +45,9 @@ const LEAST_DENSITY: f32 = 1e-12;
 ///
 /// `dy/dv = 1 / m`, `dx/du = m / p` and `dx/dv = -(∂u/∂y) m / p dy/dv`.
 ///
-/// As the density has no steps, neither have they: cells of a lattice change their shape little by little,
-/// so that footprints made from them go on side by side. Nodes are corners: they are seams of the second
-/// derivatives alone.
+/// As the density has no steps, the sizes of cells have none: a lattice's change little by little, so that
+/// footprints made from them go on side by side. The shear `dx/dv` has one at each row of nodes, where the
+/// density's slope has, which is a seam.
 ///
 /// ```
 /// use caustics_sampling::{glam::vec2, warp::DensityTable};
