@@ -60,9 +60,15 @@ pub fn write(file: &str, names: &[&str], panels: &[Panel]) -> Result<(), Failure
         let y = 16.0 + ENTRY_HEIGHT * (index / per_row) as f64;
         writeln!(
             svg,
-            "<path d=\"M{x} {y}h24\" stroke=\"{}\" stroke-width=\"2\"/>\
+            "<path d=\"M{x} {y}h24\" stroke=\"{}\" stroke-width=\"2\"{}/>\
              <text x=\"{}\" y=\"{}\">{name}</text>",
             color(index),
+            dashes(
+                panels
+                    .iter()
+                    .flat_map(|it| &it.lines)
+                    .all(|it| it.is_dashed || it.name != index)
+            ),
             x + 30.0,
             y + 4.0,
         )?;
@@ -76,6 +82,15 @@ pub fn write(file: &str, names: &[&str], panels: &[Panel]) -> Result<(), Failure
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/");
     fs::write(format!("{folder}{file}"), svg)?;
     Ok(())
+}
+
+/// As an attribute.
+fn dashes(is_dashed: bool) -> &'static str {
+    if is_dashed {
+        " stroke-dasharray=\"5 4\""
+    } else {
+        ""
+    }
 }
 
 fn color(name: usize) -> &'static str {
@@ -212,11 +227,7 @@ fn draw(svg: &mut String, [left, top]: [f64; 2], panel: &Panel) -> Result<(), Fa
     )?;
     for line in &panel.lines {
         let color = color(line.name);
-        let dashes = if line.is_dashed {
-            " stroke-dasharray=\"5 4\""
-        } else {
-            ""
-        };
+        let dashes = dashes(line.is_dashed);
         write!(
             svg,
             "<polyline fill=\"none\" stroke=\"{color}\" stroke-width=\"1.6\"{dashes} points=\""

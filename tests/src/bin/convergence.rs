@@ -232,16 +232,21 @@ fn chart(series: &[Series]) -> String {
     const WIDTH: f64 = 680.0;
     const HEIGHT: f64 = 440.0;
     const FRAME: [f64; 4] = [64.0, 20.0, 440.0, 390.0];
-    /// Decades of the error.
-    const DECADES: [i32; 2] = [-8, 1];
+    // Whole decades around all errors.
+    let errors = series.iter().flat_map(|one| &one.errors);
+    let logarithms = errors.map(|(_, error)| error.relative_mse.log10());
+    let decades = [
+        logarithms.clone().fold(0.0, f64::min).floor() as i32,
+        logarithms.fold(0.0, f64::max).ceil() as i32,
+    ];
     let [left, top, right, bottom] = FRAME;
     let x = |power: f64| {
         let part = (power - f64::from(COUNTS[0])) / f64::from(COUNTS[1] - COUNTS[0]);
         left + part * (right - left)
     };
     let y = |error: f64| {
-        let part = (error.log10() - f64::from(DECADES[0])) / f64::from(DECADES[1] - DECADES[0]);
-        bottom - part.clamp(0.0, 1.0) * (bottom - top)
+        let part = (error.log10() - f64::from(decades[0])) / f64::from(decades[1] - decades[0]);
+        bottom - part * (bottom - top)
     };
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
@@ -257,7 +262,7 @@ fn chart(series: &[Series]) -> String {
             bottom + 16.0
         );
     }
-    for decade in DECADES[0]..=DECADES[1] {
+    for decade in decades[0]..=decades[1] {
         let at = y(10f64.powi(decade));
         let _ = writeln!(
             svg,
