@@ -1,0 +1,7 @@
+//! Tests of metrics and image files: one program, which takes less time to build than one for each file.
+
+#[cfg(feature = "exr")]
+mod exr_files;
+mod metric_properties;
+#[cfg(feature = "png")]
+mod png_files;

@@ -1,0 +1,7 @@
+//! Tests of sequences, warps and shares: one program, which takes less time to build than one for each file.
+
+mod density_table;
+mod lattices;
+mod sequences;
+mod shares;
+mod warps;

@@ -1,0 +1,12 @@
+//! Tests of scenes and what is read into them: one program, which takes less time to build than one for each file.
+
+mod brdf;
+#[cfg(feature = "gltf")]
+mod gltf_features;
+#[cfg(feature = "gltf")]
+mod gltf_materials;
+#[cfg(feature = "gltf")]
+mod gltf_robustness;
+mod instanced;
+mod world;
+mod writer;
