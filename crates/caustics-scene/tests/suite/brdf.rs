@@ -1,5 +1,4 @@
 //! How receivers reflect: reciprocity, energy by quadrature, and the equations in f64.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use caustics_scene::Brdf;
 use glam::{DVec3, Vec3};

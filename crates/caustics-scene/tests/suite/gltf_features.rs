@@ -1,5 +1,4 @@
 //! Every feature of glTF that is modelled, each in a file written for it.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::writer;
 

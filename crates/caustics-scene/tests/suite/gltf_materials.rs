@@ -1,5 +1,4 @@
 //! What becomes of materials, and what is reported as not modelled.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::writer;
 

@@ -1,5 +1,4 @@
 //! Broken files: an error or a warning in one line, never a panic, a hang, or a great allocation.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::writer;
 

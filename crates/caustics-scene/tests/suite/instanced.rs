@@ -1,7 +1,5 @@
 //! Objects that move against the same scene flattened.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use caustics_geometry::{Ray, shapes};
 use caustics_scene::{
     BvhOptions, Instance, InstancedIntersector, Intersect, Material, Scene, SceneError, Shape,

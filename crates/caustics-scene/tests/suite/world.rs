@@ -1,7 +1,5 @@
 //! Properties of the flattened world, against f64 and against brute force.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use caustics_geometry::{Hit, Ray, TriangleMesh};
 use caustics_scene::{
     BvhOptions, Instance, Intersect, Material, Scene, SceneError, Shape, World, builtin,
