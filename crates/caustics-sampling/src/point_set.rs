@@ -1,7 +1,9 @@
 use glam::Vec2;
 
+use crate::counter_rng::pcg4d;
 use crate::{
-    CounterRng, Grid, Rank1Lattice, Rotation, Sequence, halton, halton_scrambled, kronecker, sobol,
+    CounterRng, Grid, GridCell, Rank1Lattice, Rotation, Sequence, halton, halton_scrambled,
+    kronecker, sobol, unit_interval,
 };
 
 /// A number of points of the unit square, by any [`Sequence`], ready to be asked for one by one.
@@ -111,40 +113,42 @@ impl PointSet {
             Kind::Sobol => Vec2::new(sobol(index, 0, self.seed), sobol(index, 1, self.seed)),
             Kind::Grid { grid, place } => {
                 let cell = grid.cell(index);
-                (cell.corner + place * cell.size).map(crate::unit_interval::nearest)
+                (cell.corner + place * cell.size).map(unit_interval::nearest)
             }
             Kind::Fibonacci { lattice, rotation } => rotation.apply(lattice.point(index)),
             Kind::Kronecker { rotation } => rotation.apply(kronecker(index)),
         }
     }
 
-    /// Coordinate `dimension` of point `index`, in `[0, 1)`: 0 and 1 are those of
-    /// [`point`](Self::point), further ones are for what else a light has to choose, such as the
-    /// place on its area.
+    /// Coordinate `dimension` of point `index` of a set of more than two dimensions, in `[0, 1)`: 2 and
+    /// further ones are for what else a light has to choose, such as the place on its area.
     ///
-    /// Halton and Sobol' have them from their own sequence. The lattices take a scrambled Sobol'
-    /// sequence; on the grid it runs along a Z-order curve, so that blocks of neighbouring cells
-    /// have well spread values (Ahmed and Wonka, *Screen-Space Blue-Noise Diffusion of Monte Carlo
-    /// Sampling Error via Hierarchical Ordering of Pixels*, 2020).
+    /// Halton and Sobol' have them from their own sequence, and the rank-1 lattices take a scrambled
+    /// Sobol' sequence; 0 and 1 are those of [`point`](Self::point). The grid is a lattice of four
+    /// dimensions: from cell to cell of a row or column 2 and 3 go on by steps that no block, row or
+    /// column of cells meets twice, and 0 and 1 move about inside the cell, since what ends along an edge
+    /// of the square, as the light of a ball that fills the cone it is aimed with, would else be met by all
+    /// points of a row alike. Further ones are scrambled Sobol' numbers.
     #[must_use]
     pub fn sample(&self, index: u32, dimension: u32) -> f32 {
-        if dimension < 2 {
-            return self.point(index)[dimension as usize];
-        }
         match self.kind {
+            Kind::Grid { grid, place } if dimension < 4 => {
+                let start = match dimension {
+                    0 | 1 => place[dimension as usize],
+                    _ if self.seed == 0 => 0.5,
+                    _ => {
+                        let words = [self.seed as u32, (self.seed >> 32) as u32, dimension, 2];
+                        unit_interval::from_bits(pcg4d(words)[0])
+                    }
+                };
+                joint_coordinate(&grid.cell(index), dimension as usize, start)
+            }
+            _ if dimension < 2 => self.point(index)[dimension as usize],
             Kind::Halton if self.seed == 0 => halton(index, dimension),
             Kind::Halton => halton_scrambled(index, dimension, self.seed),
             Kind::Sobol => sobol(index, dimension, self.seed),
             // From dimension four on Sobol' is scrambled for a seed of zero, too.
-            Kind::Grid { grid, .. } => {
-                let cell = grid.cell(index);
-                sobol(
-                    z_order(cell.column, cell.row),
-                    dimension.saturating_add(2),
-                    self.seed,
-                )
-            }
-            Kind::Fibonacci { .. } | Kind::Kronecker { .. } => {
+            Kind::Grid { .. } | Kind::Fibonacci { .. } | Kind::Kronecker { .. } => {
                 sobol(index, dimension.saturating_add(2), self.seed)
             }
         }
@@ -170,16 +174,32 @@ impl PointSet {
     }
 }
 
-/// The bits of `x` and `y` in turn, `x` lowest: the place on the Z-order curve, modulo 2^32.
-fn z_order(x: u32, y: u32) -> u32 {
-    let spread = |bits: u32| {
-        let bits = bits & 0xFFFF;
-        let bits = (bits | bits << 8) & 0x00FF_00FF;
-        let bits = (bits | bits << 4) & 0x0F0F_0F0F;
-        let bits = (bits | bits << 2) & 0x3333_3333;
-        (bits | bits << 1) & 0x5555_5555
-    };
-    spread(x) | spread(y) << 1
+/// What a cell's first four coordinates change by from column to column and from row to row, in parts of
+/// 2^32: inside the cell by (3 - sqrt 5) / 2 and 2 - sqrt 3. Those of the others are the best of 550,000 at
+/// random, improved by small steps: cells that are c columns and r rows apart, up to 64, are at least
+/// 0.215 / sqrt(c r) apart in the square of these two coordinates, on the torus. With the roots of the first
+/// four primes, half as far, a picture lit by a sky had up to twice the error.
+const STEPS: [[u32; 2]; 4] = [
+    [0, 0x4498_517B],
+    [0x61C8_8647, 0],
+    [0x978F_CFB9, 0xA0CD_1370],
+    [0xF621_24A1, 0x6921_EE11],
+];
+
+/// Coordinate `dimension`, below 4, of a cell of a grid as a lattice of four dimensions; that of the first
+/// cell is `start`, of which the first two are relative to the cell.
+fn joint_coordinate(cell: &GridCell, dimension: usize, start: f32) -> f32 {
+    let [by_column, by_row] = STEPS[dimension];
+    let bits = by_column
+        .wrapping_mul(cell.column)
+        .wrapping_add(by_row.wrapping_mul(cell.row));
+    let moved = start + unit_interval::from_bits(bits);
+    let coordinate = if moved >= 1.0 { moved - 1.0 } else { moved };
+    if dimension < 2 {
+        unit_interval::nearest(cell.corner[dimension] + coordinate * cell.size[dimension])
+    } else {
+        coordinate
+    }
 }
 
 #[cfg(test)]
@@ -187,10 +207,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn z_order_interleaves() {
-        assert_eq!(z_order(0b11, 0b00), 0b0101);
-        assert_eq!(z_order(0b01, 0b10), 0b1001);
-        assert_eq!(z_order(0xFFFF, 0xFFFF), u32::MAX);
+    fn cells_beside_each_other_have_far_apart_coordinates() {
+        let mut least = f64::INFINITY;
+        for (column, row) in
+            (0..=64_i64).flat_map(|row| (-64..=64_i64).map(move |column| (column, row)))
+        {
+            if row == 0 && column <= 0 {
+                continue;
+            }
+            let squared: f64 = STEPS[2..]
+                .iter()
+                .map(|steps| {
+                    let moved = steps.map(|step| f64::from(step) / 4_294_967_296.0);
+                    let apart = column as f64 * moved[0] + row as f64 * moved[1];
+                    (apart - apart.round()).powi(2)
+                })
+                .sum();
+            let cells = column.abs().max(1) * row.max(1);
+            least = least.min((squared * cells as f64).sqrt());
+        }
+        assert!(least > 0.215, "{least}");
     }
 
     #[test]

@@ -32,10 +32,11 @@ pub struct EmissionSample {
 }
 
 impl EmissionSample {
-    /// Number `index` of a set.
+    /// Number `index` of a set, for a light with an area or a sky.
     #[must_use]
     pub fn of(points: &PointSet, index: u32) -> Self {
         Self {
+            point: Vec2::new(points.sample(index, 0), points.sample(index, 1)),
             place: Vec2::new(points.sample(index, 2), points.sample(index, 3)),
             ..Self::without_place(points, index)
         }

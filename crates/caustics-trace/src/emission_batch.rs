@@ -145,12 +145,16 @@ impl EmissionBatch {
 
     /// The sample of point `number`.
     pub(crate) fn sample_of(&self, number: u32) -> EmissionSample {
-        let points = self.points();
-        self.guided(if self.emitter.dimensions() == 2 {
-            EmissionSample::without_place(points, number)
+        self.guided(self.unguided(self.points(), number))
+    }
+
+    /// Number `index` of a set of points, with as many coordinates as the light has parameters.
+    fn unguided(&self, points: &PointSet, index: u32) -> EmissionSample {
+        if self.emitter.dimensions() == 2 {
+            EmissionSample::without_place(points, index)
         } else {
-            EmissionSample::of(points, number)
-        })
+            EmissionSample::of(points, index)
+        }
     }
 
     /// Of a light without an area, what is beside point `number`, in cells from it; `None` outside
@@ -258,7 +262,7 @@ impl EmissionBatch {
         points: &PointSet,
         index: u32,
     ) {
-        let sample = EmissionSample::of(points, index);
+        let sample = self.unguided(points, index);
         if let Some(emission) = self.emitter.emit::<N>(world, &sample) {
             let mut random = self.random(0, u64::from(index));
             tracer.trace(&emission, self.media, &mut random);

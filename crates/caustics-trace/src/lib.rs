@@ -133,6 +133,7 @@ mod emission;
 mod emission_batch;
 mod emitter;
 mod give_back;
+mod grazing;
 mod guide;
 mod lattice;
 mod ledger;

@@ -9,6 +9,7 @@ use crate::casters::Casters;
 use crate::differential::RayDifferential;
 use crate::emission::Emission;
 use crate::emission_batch::EmissionBatch;
+use crate::grazing::Grazing;
 use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::optics::beer_lambert;
@@ -380,6 +381,10 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         // Where only a part of the paths goes on, those that do stand farther apart.
         // By roots, which round alike on every machine, as powers do not.
         let mut differential = event.scattered(outgoing);
+        // With two parameters what stands beside a photon says more than its derivative.
+        if N > 2 && outgoing.event != Event::Passage {
+            differential = event.grazing(outgoing).kept(differential);
+        }
         if kept < 1.0 {
             let root = kept.sqrt();
             differential = differential.scaled(1.0 / if N > 2 { root.sqrt() } else { root });
@@ -444,6 +449,15 @@ struct SpecularEvent<'a, const N: usize> {
 }
 
 impl<const N: usize> SpecularEvent<'_, N> {
+    fn grazing(&self, outgoing: &Outgoing) -> Grazing<N> {
+        Grazing::of(
+            &self.branch.differential,
+            self.branch.ray.direction,
+            outgoing,
+            &self.normal_change,
+        )
+    }
+
     /// The differential of what leaves in one direction.
     fn scattered(&self, outgoing: &Outgoing) -> RayDifferential<N> {
         let before = &self.branch.differential;

@@ -137,16 +137,57 @@ fn kronecker_keeps_its_distance_at_every_count() {
     assert!(normalised_minimum_distance(&all_points(Sequence::Halton, 1000, 0)) < 0.3);
 }
 
+/// How many of these numbers of the unit interval are in the emptiest and in the fullest of its eighths.
+fn eighths(numbers: impl Iterator<Item = f32>) -> [u32; 2] {
+    let mut counts = [0; 8];
+    for number in numbers {
+        counts[(number * 8.0) as usize] += 1;
+    }
+    [0, 7].map(|place| {
+        counts.sort_unstable();
+        counts[place]
+    })
+}
+
 #[test]
-fn area_samples_are_well_spread_in_blocks_of_grid_cells() {
-    // Cells of an aligned block of 4 x 4 have one value of a further dimension in each sixteenth:
-    // along rows, the values of a column would be nearly alike.
-    let set = PointSet::new(Sequence::Grid, 64 * 64, 0);
-    for (block_x, block_y) in [(0, 0), (3, 5), (15, 15)] {
-        let mut seen = [false; 16];
-        for (x, y) in (0..16).map(|n| (block_x * 4 + n % 4, block_y * 4 + n / 4)) {
-            let stratum = (set.sample(y * 64 + x, 2) * 16.0) as usize;
-            assert!(!std::mem::replace(&mut seen[stratum], true));
+fn rows_and_columns_of_the_grid_are_well_spread_in_all_four_dimensions() {
+    const SIDE: u32 = 64;
+    for seed in [0, 5] {
+        let set = PointSet::new(Sequence::Grid, SIDE * SIDE, seed);
+        for line in 0..SIDE {
+            let row = (0..SIDE).map(|at| line * SIDE + at);
+            let column = (0..SIDE).map(|at| at * SIDE + line);
+            let inside =
+                |index: u32, dimension: u32| (set.sample(index, dimension) * SIDE as f32).fract();
+            let found = [
+                eighths(row.clone().map(|it| set.sample(it, 2))),
+                eighths(row.clone().map(|it| set.sample(it, 3))),
+                eighths(column.clone().map(|it| set.sample(it, 2))),
+                eighths(column.clone().map(|it| set.sample(it, 3))),
+                // How far the points of a row or column are from an edge of the square.
+                eighths(row.map(|it| inside(it, 1))),
+                eighths(column.map(|it| inside(it, 0))),
+            ];
+            // Of 64 numbers; independent ones have such counts once in a thousand times.
+            for [least, most] in found {
+                assert!(least >= 6 && most <= 10, "{seed} {line}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn points_of_a_light_with_an_area_stay_in_their_cells() {
+    for (count, seed) in [(1, 0), (7, 0), (1000, 9), (4096, 1 << 40)] {
+        let (grid, set) = (Grid::new(count), PointSet::new(Sequence::Grid, count, seed));
+        for index in 0..count {
+            let cell = grid.cell(index);
+            let point = Vec2::new(set.sample(index, 0), set.sample(index, 1));
+            let inside = (point - cell.corner) / cell.size;
+            assert!(
+                inside.cmpge(Vec2::splat(-1e-3)).all() && inside.cmple(Vec2::splat(1.001)).all(),
+                "{count} {seed} {index}: {inside}"
+            );
         }
     }
 }

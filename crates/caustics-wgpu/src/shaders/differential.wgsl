@@ -78,6 +78,59 @@ fn refracted(
     return result;
 }
 
+// How near a silhouette, in cells of the lattice, differentials still grow. Twin: grazing.rs.
+const NEAREST: f32 = 0.3;
+const LARGEST: f32 = 3.4028234e38;
+
+// What leaves, no wider towards the silhouette than light that near to it; `before` comes along
+// `direction`, and `eta` is that of a refraction, 0 of a reflection.
+fn kept_at_silhouette(
+    after: Differential,
+    before: Differential,
+    direction: vec3<f32>,
+    scattered_direction: vec3<f32>,
+    normal: vec3<f32>,
+    eta: f32,
+    turn: mat3x3<f32>,
+) -> Differential {
+    var result = after;
+    var cosine = abs(dot(direction, normal));
+    let scattered_cosine = abs(dot(scattered_direction, normal));
+    // By Snell's law: the one sine is eta times the other.
+    var factor = 1.0;
+    if eta > 0.0 && scattered_cosine < cosine {
+        factor = eta * eta * cosine / scattered_cosine;
+        cosine = scattered_cosine;
+    }
+    var changes: array<f32, PARAMETERS>;
+    var squares = 0.0;
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let bend = turned(turn, before.position[i]);
+        let change = factor * (dot(before.direction[i], normal) + dot(direction, bend));
+        changes[i] = change;
+        squares += change * change;
+    }
+    let slope = sqrt(squares);
+    let distance = cosine / (2.0 * slope);
+    if !(slope > 0.0 && slope < LARGEST && distance < NEAREST) {
+        return result;
+    }
+    let lost = 1.0 - sqrt(distance / NEAREST);
+    var position = vec3(0.0);
+    var turning = vec3(0.0);
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let part = changes[i] / slope;
+        position += part * after.position[i];
+        turning += part * after.direction[i];
+    }
+    for (var i = 0u; i < PARAMETERS; i++) {
+        let part = lost * (changes[i] / slope);
+        result.position[i] -= part * position;
+        result.direction[i] -= part * turning;
+    }
+    return result;
+}
+
 struct Bounded {
     differential: Differential,
     shortened: bool,

@@ -11,18 +11,6 @@ struct EmissionSample {
     weight: f32,
 }
 
-fn spread_bits(x: u32) -> u32 {
-    var bits = x & 0xffffu;
-    bits = (bits | (bits << 8u)) & 0x00ff00ffu;
-    bits = (bits | (bits << 4u)) & 0x0f0f0f0fu;
-    bits = (bits | (bits << 2u)) & 0x33333333u;
-    return (bits | (bits << 1u)) & 0x55555555u;
-}
-
-fn z_order(x: u32, y: u32) -> u32 {
-    return spread_bits(x) | (spread_bits(y) << 1u);
-}
-
 fn rotated(point: vec2<f32>, shift: vec2<f32>) -> vec2<f32> {
     let moved = point + shift;
     return moved - select(vec2(0.0), vec2(1.0), moved >= vec2(1.0));
@@ -31,6 +19,18 @@ fn rotated(point: vec2<f32>, shift: vec2<f32>) -> vec2<f32> {
 // `index` times a step of 64 bits, plus a half, as a fraction of 2^64.
 fn kronecker(index: u32, step_high: u32, step_low: u32) -> f32 {
     return unit_from_bits(index * step_high + multiply_high(index, step_low) + 0x80000000u);
+}
+
+// A coordinate of a grid as a lattice of four dimensions: what it is in the first cell, and the steps from
+// column to column and from row to row.
+fn joint_coordinate(cell: GridCell, start: f32, by_column: u32, by_row: u32) -> f32 {
+    let moved = start + unit_from_bits(cell.column * by_column + cell.row * by_row);
+    return moved - select(0.0, 1.0, moved >= 1.0);
+}
+
+fn joint_start(dimension: u32) -> f32 {
+    let seed = vec2(trace.seed_low, trace.seed_high);
+    return select(unit_from_bits(pcg4d(vec4(seed, dimension, 2u)).x), 0.5, all(seed == vec2(0u)));
 }
 
 fn lattice_place(multiple: u32, count: u32) -> f32 {
@@ -46,11 +46,20 @@ fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
     result.spacing = array(vec2(edge, 0.0), vec2(0.0, edge));
     if trace.sequence == SEQUENCE_GRID {
         let cell = grid_cell(count, trace.emitters[emitter].rows, index);
-        let point = cell.corner + place * cell.size;
+        var inside = place;
+        if PARAMETERS > 2u {
+            inside = vec2(
+                joint_coordinate(cell, place.x, 0u, 0x4498517bu),
+                joint_coordinate(cell, place.y, 0x61c88647u, 0u),
+            );
+            result.place = vec2(
+                joint_coordinate(cell, joint_start(2u), 0x978fcfb9u, 0xa0cd1370u),
+                joint_coordinate(cell, joint_start(3u), 0xf62124a1u, 0x6921ee11u),
+            );
+        }
+        let point = cell.corner + inside * cell.size;
         result.point = vec2(unit_nearest(point.x), unit_nearest(point.y));
         result.spacing = array(vec2(cell.size.x, 0.0), vec2(0.0, cell.size.y));
-        let order = z_order(cell.column, cell.row);
-        result.place = vec2(sobol(order, 4u), sobol(order, 5u));
     } else if trace.sequence == SEQUENCE_HALTON {
         result.point = vec2(halton(index, 0u), halton(index, 1u));
         result.place = vec2(halton(index, 2u), halton(index, 3u));

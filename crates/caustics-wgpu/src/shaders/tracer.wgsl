@@ -134,6 +134,17 @@ fn follow(
             gradient,
         );
     }
+    if PARAMETERS > 2u && outgoing.event != EVENT_PASSAGE {
+        differential = kept_at_silhouette(
+            differential,
+            branch.differential,
+            branch.ray.direction,
+            outgoing.direction,
+            outgoing.normal,
+            select(0.0, outgoing.eta, outgoing.event == EVENT_REFRACTION),
+            gradient,
+        );
+    }
     // Where only a part of the paths goes on, those that do stand farther apart.
     if kept < 1.0 {
         let root = sqrt(kept);
