@@ -1,6 +1,7 @@
 use glam::Vec2;
 
 use crate::counter_rng::CounterRng;
+use crate::unit_interval::wrapped_sum;
 
 /// A shift of the unit square on the torus: randomises any lattice without changing the distances
 /// in it (Cranley and Patterson 1976).
@@ -38,8 +39,9 @@ impl Rotation {
     #[must_use]
     #[inline]
     pub fn apply(&self, point: Vec2) -> Vec2 {
-        // Two numbers below one sum to less than two, and subtracting one is exact.
-        let wrap = |x: f32| if x >= 1.0 { x - 1.0 } else { x };
-        (point + self.shift).map(wrap)
+        Vec2::new(
+            wrapped_sum(point.x, self.shift.x),
+            wrapped_sum(point.y, self.shift.y),
+        )
     }
 }

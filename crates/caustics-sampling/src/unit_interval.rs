@@ -8,6 +8,12 @@ pub(crate) const fn from_bits(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// The sum of two numbers of the interval, modulo one, which is exact but for the sum: it is less than two.
+pub(crate) const fn wrapped_sum(a: f32, b: f32) -> f32 {
+    let sum = a + b;
+    if sum >= 1.0 { sum - 1.0 } else { sum }
+}
+
 /// The nearest number of the interval; zero for a NaN.
 pub(crate) const fn nearest(x: f32) -> f32 {
     if x > 0.0 { x.min(BELOW_ONE) } else { 0.0 }

@@ -83,8 +83,8 @@ pub enum FootprintSource {
     Differential,
     /// From its ray differential, and neighbours landed where it says or farther away.
     Checked,
-    /// From its ray differential, of which a derivative of the direction was shortened on the way:
-    /// at a critical angle or where a surface bends too fast.
+    /// From its ray differential, which was shortened on the way: at a critical angle, where a surface
+    /// bends too fast, or, of a light with an area or a sky, at a silhouette.
     Bounded,
     /// From the finite difference to a neighbour on the lattice, which landed nearer than the
     /// differential said.

@@ -381,15 +381,17 @@ impl<'a, I: Intersect + ?Sized, const N: usize> PathTracer<'a, I, N> {
         // Where only a part of the paths goes on, those that do stand farther apart.
         // By roots, which round alike on every machine, as powers do not.
         let mut differential = event.scattered(outgoing);
+        let mut is_grazing = false;
         // With two parameters what stands beside a photon says more than its derivative.
         if N > 2 && outgoing.event != Event::Passage {
-            differential = event.grazing(outgoing).kept(differential);
+            (differential, is_grazing) = event.grazing(outgoing).bounded(differential);
         }
         if kept < 1.0 {
             let root = kept.sqrt();
             differential = differential.scaled(1.0 / if N > 2 { root.sqrt() } else { root });
         }
-        let (differential, shortened) = differential.bounded(DIRECTION_CHANGE_LIMIT);
+        let (differential, is_long) = differential.bounded(DIRECTION_CHANGE_LIMIT);
+        let shortened = is_grazing || is_long;
         self.ledger.bounded_differentials += u64::from(shortened);
         let source = if kept < 1.0 || branch.source == FootprintSource::Thinned {
             FootprintSource::Thinned

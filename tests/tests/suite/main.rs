@@ -1,4 +1,6 @@
-//! Tests of pictures and exact oracles: one program, which takes less time to build than one for each file.
+//! Tests of pictures and exact oracles.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod boundaries;
 mod convergence;

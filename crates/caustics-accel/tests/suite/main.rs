@@ -1,4 +1,6 @@
-//! Tests of hierarchies and photon searches: one program, which takes less time to build than one for each file.
+//! Tests of hierarchies and photon searches.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod box_search;
 mod common;

@@ -1,4 +1,6 @@
-//! Tests of metrics and image files: one program, which takes less time to build than one for each file.
+//! Tests of metrics and image files.
+//!
+//! One program, which takes less time to build than one for each file.
 
 #[cfg(feature = "exr")]
 mod exr_files;

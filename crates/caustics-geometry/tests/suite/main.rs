@@ -1,4 +1,6 @@
-//! Tests of shapes, meshes and their intersection: one program, which takes less time to build than one for each file.
+//! Tests of shapes, meshes and their intersection.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod mesh;
 mod normal_derivative;

@@ -1,4 +1,6 @@
-//! Tests of estimates from photons: one program, which takes less time to build than one for each file.
+//! Tests of estimates from photons.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod corner_light;
 mod direct_light;

@@ -168,7 +168,6 @@ fn rows_and_columns_of_the_grid_are_well_spread_in_all_four_dimensions() {
                 eighths(row.map(|it| inside(it, 1))),
                 eighths(column.map(|it| inside(it, 0))),
             ];
-            // Of 64 numbers. Those of a Z-order curve would leave half of the eighths empty.
             for [least, most] in found {
                 assert!(least >= 5 && most <= 12, "{seed} {line}: {found:?}");
             }

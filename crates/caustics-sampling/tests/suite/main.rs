@@ -1,4 +1,6 @@
-//! Tests of sequences, warps and shares: one program, which takes less time to build than one for each file.
+//! Tests of sequences, warps and shares.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod density_table;
 mod lattices;

@@ -1,4 +1,6 @@
-//! Tests of scenes and what is read into them: one program, which takes less time to build than one for each file.
+//! Tests of scenes and what is read into them.
+//!
+//! One program, which takes less time to build than one for each file.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod brdf;

@@ -7,7 +7,7 @@
 //! there the answer is not determined by the f32 path, and no arithmetic of the differential could
 //! give it. The filter asks only the f64 path, never the crate, and the suite counts what it skips.
 //!
-//! Of 205,000 chains 154,000 were kept in a long run; the worst error was 4.9 10⁻⁴.
+//! Of 6,000 chains 4,382 were kept in one run; the worst error was 1.5 10⁻⁴.
 
 use crate::common;
 
@@ -193,7 +193,8 @@ fn build(draw: &ChainDraw) -> Option<Chain> {
 /// The exact derivatives, if two roundings move none of them by a tenth of the tolerance.
 fn well_conditioned(chain: &Chain) -> Option<[PointAndDirection; 2]> {
     let exact = chain.exact(Jitter::NONE)?;
-    let steady = (1..=6u64).all(|seed| {
+    // With six of them a chain was once kept that moves by more than the limit; it was off by 1.2e-3.
+    let steady = (1..=24u64).all(|seed| {
         chain
             .exact(Jitter {
                 seed,

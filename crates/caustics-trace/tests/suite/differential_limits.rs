@@ -3,8 +3,10 @@
 
 use crate::common;
 
+use caustics_scene::{Light, LightError, Material, Scene};
 use caustics_trace::glam::{DVec3, Vec3};
-use caustics_trace::{RayDifferential, fresnel_dielectric, refract};
+use caustics_trace::{RayDifferential, TraceOptions, fresnel_dielectric, refract, trace_photons};
+use common::scenes::{add_sphere, flattened};
 use common::{direction, tilted};
 use proptest::prelude::*;
 
@@ -199,4 +201,41 @@ fn the_derivative_diverges_as_it_should() {
         let ratio = length(0.25 * offset) / length(offset);
         assert!((ratio - 2.0).abs() < 0.05, "at {offset}: {ratio}");
     }
+}
+
+/// The part of photons aimed at a mirror ball whose differentials were shortened.
+fn bounded(light: Result<Light, LightError>) -> f64 {
+    let mut scene = Scene::new();
+    add_sphere(
+        &mut scene,
+        Vec3::ZERO,
+        0.5,
+        Material::metal("metal", [0.9; 3]),
+    );
+    scene
+        .add_light(light.expect("a valid light"))
+        .expect("a valid light");
+    let (world, intersector) = flattened(&scene);
+    let options = TraceOptions {
+        photons: 40_000,
+        guide_emission: false,
+        ..TraceOptions::default()
+    };
+    let map = trace_photons(&world, &intersector, &options, &|_| {}).expect("valid options");
+    map.ledger.bounded_differentials as f64 / f64::from(options.photons)
+}
+
+#[test]
+fn light_of_a_lamp_that_grazes_a_ball_is_bounded_and_counted() {
+    const ABOVE: [f32; 3] = [0.0, 3.0, 0.0];
+    let lamp = |radius: f32| bounded(Light::disc(ABOVE, [0.0, -1.0, 0.0], radius, [1.0; 3]));
+    // 800 of 40,000 cells lie along the edge of the cone, of each of which the outer 0.3 are too near it.
+    let found = lamp(1e-4);
+    assert!((0.004..0.008).contains(&found), "{found}");
+    // Where an eighth of the blur is wider than a step, that counts.
+    let found = lamp(0.3);
+    assert!((0.1..0.4).contains(&found), "{found}");
+    // Neighbours tell where the light of a point ends.
+    let found = bounded(Light::point(ABOVE, [1.0; 3]));
+    assert!(found < 1e-3, "{found}");
 }

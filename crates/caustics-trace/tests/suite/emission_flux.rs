@@ -5,13 +5,14 @@ use crate::common;
 
 use std::f64::consts::{PI, TAU};
 
-use caustics_geometry::shapes::quad;
+use caustics_accel::Intersect;
+use caustics_geometry::shapes::{quad, uv_sphere};
 use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::{CounterRng, PointSet, Sequence};
 use caustics_scene::{Light, Material, Scene, World};
 use caustics_trace::glam::{DVec3, Vec2, Vec3};
 use caustics_trace::{Aim, BLUR_EDGE, Casters, Emission, EmissionSample, Emitter};
-use common::scenes::{add_floor, add_mesh, add_sphere};
+use common::scenes::{add_floor, add_mesh, add_sphere, flattened};
 use proptest::prelude::*;
 
 const BALL: Sphere = Sphere {
@@ -275,6 +276,39 @@ fn photons_of_a_lattice_carry_the_whole_flux() {
         };
         assert!(error < tolerance, "{error:e}: {light:?}");
     }
+}
+
+/// The part of photons aimed at an inscribed ball that miss it.
+fn missed(count: u32, sequence: Sequence) -> f64 {
+    let mut scene = Scene::new();
+    let mesh = uv_sphere(0.5, 64, 32).expect("a valid ball");
+    add_mesh(&mut scene, "ball", mesh, Material::dielectric("glass", 1.5));
+    scene.add_light(panel()).expect("a valid light");
+    let (world, rays) = flattened(&scene);
+    let emitter = &emitters(&world, Aim::Casters)[0];
+    let points = PointSet::new(sequence, count, 0);
+    let sent = (0..count)
+        .filter_map(|it| emitter.emit::<4>(&world, &EmissionSample::of(&points, it)))
+        .map(|photon| rays.closest_hit(&photon.ray).is_none());
+    let (missed, all) = sent.fold((0, 0), |(missed, all), it| {
+        (missed + u32::from(it), all + 1)
+    });
+    f64::from(missed) / f64::from(all)
+}
+
+#[test]
+fn a_lattice_misses_as_much_as_there_is_to_miss() {
+    // Between the ball and the cone that just holds it is a quarter of a cell at most: points in the middles
+    // of their cells would all meet the ball.
+    let (found, expected) = (
+        missed(160_000, Sequence::Grid),
+        missed(1_000_000, Sequence::Halton),
+    );
+    println!("{found:.3e} for {expected:.3e}");
+    assert!(
+        (found / expected - 1.0).abs() < 0.2,
+        "{found} for {expected}"
+    );
 }
 
 /// Where a photon's ray meets the ball.

@@ -1,4 +1,6 @@
-//! Tests of photons and their differentials: one program, which takes less time to build than one for each file.
+//! Tests of photons and their differentials.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod aimed_pairs;
 mod common;

@@ -78,13 +78,18 @@ fn refracted(
     return result;
 }
 
-// How near a silhouette, in cells of the lattice, differentials still grow. Twin: grazing.rs.
+struct Bounded {
+    differential: Differential,
+    shortened: bool,
+}
+
+// How near a silhouette differentials still grow, in steps and parts of the blur. Twin: grazing.rs.
 const NEAREST: f32 = 0.3;
 const LARGEST: f32 = 3.4028234e38;
 
 // What leaves, no wider towards the silhouette than light that near to it; `before` comes along
 // `direction`, and `eta` is that of a refraction, 0 of a reflection.
-fn kept_at_silhouette(
+fn bounded_at_silhouette(
     after: Differential,
     before: Differential,
     direction: vec3<f32>,
@@ -92,8 +97,8 @@ fn kept_at_silhouette(
     normal: vec3<f32>,
     eta: f32,
     turn: mat3x3<f32>,
-) -> Differential {
-    var result = after;
+) -> Bounded {
+    var result = Bounded(after, false);
     var cosine = abs(dot(direction, normal));
     let scattered_cosine = abs(dot(scattered_direction, normal));
     // By Snell's law: the one sine is eta times the other.
@@ -125,15 +130,11 @@ fn kept_at_silhouette(
     }
     for (var i = 0u; i < PARAMETERS; i++) {
         let part = lost * (changes[i] / slope);
-        result.position[i] -= part * position;
-        result.direction[i] -= part * turning;
+        result.differential.position[i] -= part * position;
+        result.differential.direction[i] -= part * turning;
     }
+    result.shortened = true;
     return result;
-}
-
-struct Bounded {
-    differential: Differential,
-    shortened: bool,
 }
 
 fn bounded(before: Differential, limit: f32) -> Bounded {

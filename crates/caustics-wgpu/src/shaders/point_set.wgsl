@@ -21,11 +21,16 @@ fn kronecker(index: u32, step_high: u32, step_low: u32) -> f32 {
     return unit_from_bits(index * step_high + multiply_high(index, step_low) + 0x80000000u);
 }
 
-// A coordinate of a grid as a lattice of four dimensions: what it is in the first cell, and the steps from
-// column to column and from row to row.
-fn joint_coordinate(cell: GridCell, start: f32, by_column: u32, by_row: u32) -> f32 {
-    let moved = start + unit_from_bits(cell.column * by_column + cell.row * by_row);
-    return moved - select(0.0, 1.0, moved >= 1.0);
+// Two coordinates of a grid as a lattice of four dimensions: what they are in the first cell, and the steps
+// from column to column and from row to row.
+fn joint_pair(
+    cell: GridCell,
+    start: vec2<f32>,
+    by_column: vec2<u32>,
+    by_row: vec2<u32>,
+) -> vec2<f32> {
+    let bits = cell.column * by_column + cell.row * by_row;
+    return rotated(vec2(unit_from_bits(bits.x), unit_from_bits(bits.y)), start);
 }
 
 fn joint_start(dimension: u32) -> f32 {
@@ -48,14 +53,10 @@ fn emission_sample(index: u32, emitter: u32) -> EmissionSample {
         let cell = grid_cell(count, trace.emitters[emitter].rows, index);
         var inside = place;
         if PARAMETERS > 2u {
-            inside = vec2(
-                joint_coordinate(cell, place.x, 0u, 0x4498517bu),
-                joint_coordinate(cell, place.y, 0x61c88647u, 0u),
-            );
-            result.place = vec2(
-                joint_coordinate(cell, joint_start(2u), 0x978fcfb9u, 0xa0cd1370u),
-                joint_coordinate(cell, joint_start(3u), 0xf62124a1u, 0x6921ee11u),
-            );
+            inside = joint_pair(cell, place, vec2(0u, 0x61c88647u), vec2(0x4498517bu, 0u));
+            let start = vec2(joint_start(2u), joint_start(3u));
+            result.place = joint_pair(
+                cell, start, vec2(0x978fcfb9u, 0xf62124a1u), vec2(0xa0cd1370u, 0x6921ee11u));
         }
         let point = cell.corner + inside * cell.size;
         result.point = vec2(unit_nearest(point.x), unit_nearest(point.y));

@@ -134,8 +134,9 @@ fn follow(
             gradient,
         );
     }
+    var is_grazing = false;
     if PARAMETERS > 2u && outgoing.event != EVENT_PASSAGE {
-        differential = kept_at_silhouette(
+        let kept = bounded_at_silhouette(
             differential,
             branch.differential,
             branch.ray.direction,
@@ -144,6 +145,8 @@ fn follow(
             select(0.0, outgoing.eta, outgoing.event == EVENT_REFRACTION),
             gradient,
         );
+        differential = kept.differential;
+        is_grazing = kept.shortened;
     }
     // Where only a part of the paths goes on, those that do stand farther apart.
     if kept < 1.0 {
@@ -152,7 +155,7 @@ fn follow(
             differential, 1.0 / select(sqrt(root), root, PARAMETERS == 2u));
     }
     let shortened = bounded(differential, DIRECTION_CHANGE_LIMIT);
-    count_up(COUNTER_BOUNDED, select(0u, 1u, shortened.shortened));
+    count_up(COUNTER_BOUNDED, select(0u, 1u, is_grazing || shortened.shortened));
     let origin = origin_towards(point.spawn, point.geometric_normal, outgoing.direction);
     let object = bodies[point.body].object;
     pending[pending_count] = Branch(

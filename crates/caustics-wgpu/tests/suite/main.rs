@@ -1,4 +1,6 @@
-//! Tests of the shaders: one program, which takes less time to build than one for each file.
+//! Tests of the shaders.
+//!
+//! One program, which takes less time to build than one for each file.
 
 mod common;
 mod device;

@@ -1,7 +1,5 @@
 //! A closed mesh and rays aimed at its weakest places.
 
-// Each test program uses a part of this.
-
 pub(crate) mod brute_force;
 
 use std::collections::HashMap;
