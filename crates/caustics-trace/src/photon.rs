@@ -81,7 +81,8 @@ pub enum FootprintSource {
     /// a lattice of two parameters, or no neighbour took the same path.
     #[default]
     Differential,
-    /// From its ray differential, and neighbours landed where it says or farther away.
+    /// From its ray differential, and neighbours landed where it says or farther away. Where those on
+    /// both sides land about as far as it says, they are half of it.
     Checked,
     /// From its ray differential, which was shortened on the way: at a critical angle, where a surface
     /// bends too fast, or, of a light with an area or a sky, at a silhouette.

@@ -304,7 +304,7 @@ proptest! {
             let squares = one.length_squared() + other.length_squared();
             one.cross(other).length().max(0.01 * squares)
         });
-        let covered = steps + 3.0 * (steps * blurs).sqrt();
+        let covered = steps + 4.0 * (steps * blurs).sqrt();
         let own = steps / covered;
         for probe in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.6, 0.0, 0.8)] {
             let probe = across(probe, normal).as_dvec3();

@@ -24,7 +24,13 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
     let (plain, checked) = (trace(false, 20_000), trace(true, 20_000));
     assert_eq!(plain.photons.len(), checked.photons.len());
     assert_eq!(plain.ledger.replaced_differentials, 0);
-    let (mut replaced, mut verified, mut moved, mut weighed) = (0, 0, 0, 0);
+    let [
+        mut replaced,
+        mut verified,
+        mut averaged,
+        mut moved,
+        mut weighed,
+    ] = [0; 5];
     let mut gain = DVec3::ZERO;
     for (before, after) in plain.photons.iter().zip(&checked.photons) {
         let weight = after.flux.x / before.flux.x;
@@ -46,7 +52,7 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
         let lengths = before.axes.map(Vec3::length);
         for (axis, length) in after.axes.iter().zip(lengths) {
             assert!(
-                axis.is_finite() && axis.length() <= 1.001 * length,
+                axis.is_finite() && axis.length() <= 1.126 * length,
                 "{after:?}"
             );
         }
@@ -57,8 +63,13 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
             FootprintSource::Neighbour => replaced += 1,
             FootprintSource::Checked => {
                 verified += 1;
-                // Even light at an edge is drawn in; all other footprints stay.
-                assert!(way > 0.0 || before.axes == after.axes);
+                // Even light at an edge is drawn in; what neighbours agree with changes a little.
+                let shortest = [0, 1].map(|i| after.axes[i].length() / lengths[i]);
+                if shortest.into_iter().all(|it| it > 0.7) {
+                    assert!(shortest.into_iter().all(|it| it > 0.89), "{after:?}");
+                    assert!(way <= 0.07 * (lengths[0] + lengths[1]), "{way}");
+                    averaged += u64::from(before.axes != after.axes);
+                }
             }
             FootprintSource::Thinned => assert_eq!(before.axes, after.axes),
             _ => {}
@@ -75,6 +86,7 @@ fn the_check_shortens_and_moves_and_weighs_what_is_at_silhouettes() {
     assert!(gain.length() < 3e-3 * stored.length(), "{gain} of {stored}");
     assert!(checked.ledger.imbalance() < 1e-6);
     assert!(verified > 10 * replaced, "{verified} {replaced}");
+    assert!(averaged > verified / 2, "{averaged} of {verified}");
 }
 
 #[test]

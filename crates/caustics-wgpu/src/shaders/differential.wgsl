@@ -3,7 +3,7 @@
 
 // Twins: those of differential.rs.
 const BLUR_EDGE: f32 = 0.125;
-const OVERLAP: f32 = 3.0;
+const OVERLAP: f32 = 4.0;
 const LEAST_AREA: f32 = 0.01;
 
 struct Differential {

@@ -9,6 +9,9 @@ const LEAST_SILHOUETTE: f32 = 1.02;
 const AGREEMENT: f32 = 0.1;
 const UNEVEN: f32 = 2.0;
 const LONGER: f32 = 1.15;
+const EVEN: f32 = 1.4;
+const AGREEING: f32 = 0.2;
+const BEND: f32 = 0.125;
 const MAX_RATIO: f32 = 1e3;
 const FAR_INSIDE: f32 = 1e30;
 
@@ -35,11 +38,17 @@ struct Landing {
     is_sure: bool,
     is_there: bool,
     is_edge: bool,
-    // Whether the neighbours on both sides are unevenly far away, so that the light reaches halfway
-    // to each: its middle, from the photon, and its axis.
-    is_uneven: bool,
-    halfway_shift: vec3<f32>,
-    halfway_axis: vec3<f32>,
+    between: Between,
+}
+
+// What two neighbours on opposite sides of a photon say of its light along their axis.
+struct Between {
+    is_there: bool,
+    // From the photon to the middle of the light.
+    shift: vec3<f32>,
+    axis: vec3<f32>,
+    // Whether the differential has no part in it.
+    is_replaced: bool,
 }
 
 struct CheckedAxis {
@@ -62,6 +71,28 @@ fn silhouette_fit(ratio: f32, x: f32) -> vec2<f32> {
     let width = difference * sqrt(1.0 - skew * skew / 3.0);
     let scale = 2.0 * ratio * sqrt(x);
     return vec2(scale * (mean - sqrt(x)), SILHOUETTE_EXTENT * scale * width);
+}
+
+// By the steps to the neighbours before and after a photon, its axis and that axis' length.
+fn between_of(before: vec3<f32>, after: vec3<f32>, axis: vec3<f32>, length: f32) -> Between {
+    var between: Between;
+    if dot(before, after) >= 0.0 {
+        return between;
+    }
+    let a = length_of(before);
+    let b = length_of(after);
+    let near = min(a, b);
+    let far = max(a, b);
+    let half = 0.5 * (after - before);
+    if far > UNEVEN * near && length > LONGER * 0.5 * (a + b) {
+        return Between(true, 0.25 * (before + after), half, true);
+    }
+    // The axis may point either way.
+    let along = select(half, -half, dot(half, axis) < 0.0);
+    if far <= EVEN * near && length_of(axis - along) <= AGREEING * length_of(along) {
+        return Between(true, BEND * (before + after), 0.5 * (axis + along), false);
+    }
+    return between;
 }
 
 fn landing_of(
@@ -95,13 +126,7 @@ fn landing_of(
         landing.ratio = min(length / distance, MAX_RATIO);
     }
     if has_before && has_after {
-        let a = length_of(before_in_plane);
-        let b = length_of(after_in_plane);
-        landing.is_uneven = max(a, b) > UNEVEN * min(a, b)
-            && length > LONGER * 0.5 * (a + b)
-            && dot(before_in_plane, after_in_plane) < 0.0;
-        landing.halfway_shift = 0.25 * (before_in_plane + after_in_plane);
-        landing.halfway_axis = 0.5 * (after_in_plane - before_in_plane);
+        landing.between = between_of(before_in_plane, after_in_plane, axis, length);
     }
     landing.is_edge = before.is_there != after.is_there;
     if landing.is_edge && landing.ratio > LEAST_SILHOUETTE {
@@ -117,8 +142,9 @@ fn checked_axis(axis: vec3<f32>, landing: Landing) -> CheckedAxis {
     if !landing.is_there {
         return CheckedAxis(axis, vec3(0.0), false);
     }
-    if landing.is_uneven {
-        return CheckedAxis(landing.halfway_axis, landing.halfway_shift, true);
+    if landing.between.is_there {
+        return CheckedAxis(
+            landing.between.axis, landing.between.shift, landing.between.is_replaced);
     }
     // Inwards, and how wide.
     var fit = vec2(0.0, 1.0);
