@@ -5,8 +5,9 @@ use glam::Vec2;
 
 use crate::give_back::give_back;
 use crate::ledger::EnergyLedger;
+use crate::narrow_sheets::narrow_axis;
 use crate::neighbours::{EDGE_EXTENT, EDGE_SHIFT, LIMIT, LatticePhotons, MAX_RATIO, in_plane};
-use crate::path_guide::PathGuide;
+use crate::path_guide::{MOST_SURFACES, PathGuide};
 use crate::photon::{FootprintSource, Photon};
 use crate::silhouette::Silhouette;
 use crate::trace::Batch;
@@ -48,18 +49,18 @@ pub(crate) struct EdgeTracer<'a, 'b, I: ?Sized> {
 
 /// A point of the lattice, the path of one of its photons, and the axis along which that path ends.
 #[derive(Clone, Copy)]
-struct Row {
+pub(crate) struct Row {
     /// Number of the point in the whole lattice.
-    number: u32,
-    path: u32,
-    axis: usize,
+    pub(crate) number: u32,
+    pub(crate) path: u32,
+    pub(crate) axis: usize,
     /// Whether it ends towards larger or smaller coordinates.
-    sign: f32,
+    pub(crate) sign: f32,
 }
 
 impl Row {
     /// What is `along` cells from the point towards the end, and `across` cells beside the row.
-    fn offset(&self, along: f32, across: f32) -> Vec2 {
+    pub(crate) fn offset(&self, along: f32, across: f32) -> Vec2 {
         let mut offset = Vec2::splat(across);
         offset[self.axis] = self.sign * along;
         offset
@@ -101,11 +102,19 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         for (index, footprint) in own.zip(lattice.checked(point)) {
             let photon = &lattice.photons[index];
             let is_worth_it = photon.source != FootprintSource::Thinned
+                && photon.events as usize <= MOST_SURFACES
                 && flux(photon) >= SIGNIFICANT * brightest;
             let path = lattice.paths[index];
             let landed = lattice.landed(index, &neighbours);
             let number = lattice.lattice.number(point);
-            if is_worth_it && self.divide(photon, number, path, &landed, checked) {
+            let is_divided = is_worth_it
+                && match narrow_axis(photon, &neighbours, &landed) {
+                    Some(axis) => {
+                        self.divide_narrow(photon, [number, path], axis, &landed, checked)
+                    }
+                    None => self.divide(photon, number, path, &landed, checked),
+                };
+            if is_divided {
                 self.ledger.divided_photons += 1;
             } else {
                 let is_replaced = footprint.source == FootprintSource::Neighbour;
@@ -142,7 +151,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
                 axis,
                 sign,
             };
-            let reach = self.end(&row, 0.0, 0.0);
+            let reach = self.end(&row, 0.0, 0.0, HALVINGS);
             ends += 1;
             // The axis that crosses the edge the more steeply.
             if nearest.is_none_or(|(_, least)| reach < least) {
@@ -153,7 +162,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         let Some((row, reach)) = nearest else {
             return false;
         };
-        let slant = 2.0 * row.sign * (self.end(&row, 0.5, reach - 0.5) - reach);
+        let slant = 2.0 * row.sign * (self.end(&row, 0.5, reach - 0.5, HALVINGS) - reach);
         let cells = 0.5 + reach;
         let strata = STRATA.map(|(low, high)| {
             let at = 0.5 * (low + high) * cells - 0.5;
@@ -188,7 +197,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         };
         let mut parts: [Photon; PARTS] = std::array::from_fn(|number| {
             let own = &strata[number];
-            let part = edge.footprint(own, &before, strata.get(number + 1));
+            let part = edge.footprint(own, Some(&before), strata.get(number + 1));
             before = *own;
             part
         });
@@ -200,8 +209,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         }
         let back = give_back(&mut parts, inner.position, unit, row.axis);
         let mut all = parts.iter().chain([&back]);
-        let are_finite =
-            all.all(|it| it.position.is_finite() && it.axes.iter().all(|axis| axis.is_finite()));
+        let are_finite = all.all(Photon::is_finite);
         if are_finite {
             divided.extend(parts);
             divided.push(back);
@@ -210,7 +218,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
     }
 
     /// Makes sure that the way of a path is known.
-    fn knows(&mut self, number: u32, path: u32) -> bool {
+    pub(crate) fn knows(&mut self, number: u32, path: u32) -> bool {
         let Some(guide) = &mut self.tracer.guide else {
             return false;
         };
@@ -226,11 +234,11 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
     }
 
     /// How far a row goes, `across` cells beside it, in cells from its point: somewhere in the cell
-    /// that begins `from` there.
-    fn end(&mut self, row: &Row, across: f32, from: f32) -> f32 {
+    /// that begins `from` there, which is halved so often.
+    pub(crate) fn end(&mut self, row: &Row, across: f32, from: f32, halvings: u32) -> f32 {
         let mut width = 0.5;
         let mut at = from;
-        for _ in 0..HALVINGS {
+        for _ in 0..halvings {
             if self
                 .photon_at(row, row.offset(at + width, across))
                 .is_some()
@@ -243,7 +251,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
     }
 
     /// The photon of the row's path that is sent from beside its point.
-    fn photon_at(&mut self, row: &Row, offset: Vec2) -> Option<Photon> {
+    pub(crate) fn photon_at(&mut self, row: &Row, offset: Vec2) -> Option<Photon> {
         self.send(row.number, offset);
         let found = self.tracer.paths.iter().position(|&it| it == row.path)?;
         Some(self.tracer.photons[found])
@@ -264,7 +272,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
 }
 
 /// How many times as long as its axis a photon's neighbours let its footprint be, at most once.
-fn checked_ratio(photon: &Photon, axis: usize, pair: &[Option<&Photon>; 2]) -> f32 {
+pub(crate) fn checked_ratio(photon: &Photon, axis: usize, pair: &[Option<&Photon>; 2]) -> f32 {
     let neighbours = pair.iter().flatten();
     let same = neighbours.filter(|it| it.object == photon.object);
     let farthest = same
@@ -279,37 +287,42 @@ fn checked_ratio(photon: &Photon, axis: usize, pair: &[Option<&Photon>; 2]) -> f
 
 /// A part of the light of a row's last photon.
 #[derive(Clone, Copy)]
-struct Stratum {
+pub(crate) struct Stratum {
     /// As if it stood for a whole cell.
-    photon: Photon,
+    pub(crate) photon: Photon,
     /// Its middle, in cells from the point towards the edge.
-    at: f32,
+    pub(crate) at: f32,
     /// In cells.
-    width: f32,
+    pub(crate) width: f32,
     /// How far it leads along the row from one row to the next, in cells.
-    slant: f32,
+    pub(crate) slant: f32,
 }
 
 /// An edge beside a point of a lattice.
-struct Edge {
+pub(crate) struct Edge {
     /// Of the lattice, the axis of the rows that end there.
-    axis: usize,
+    pub(crate) axis: usize,
     /// Whether towards larger or smaller coordinates.
-    sign: f32,
+    pub(crate) sign: f32,
     /// By what axes along the edge are shortened.
-    narrowing: f32,
+    pub(crate) narrowing: f32,
 }
 
 impl Edge {
     /// The photon of a stratum, by those before and after it.
-    fn footprint(&self, own: &Stratum, before: &Stratum, after: Option<&Stratum>) -> Photon {
+    pub(crate) fn footprint(
+        &self,
+        own: &Stratum,
+        before: Option<&Stratum>,
+        after: Option<&Stratum>,
+    ) -> Photon {
         let mut photon = own.photon;
         photon.source = FootprintSource::Divided;
         photon.flux *= own.width;
         // For one cell towards the edge.
         let mut unit = self.sign * photon.axes[self.axis];
         let (mut inwards, mut extent) = (0.0, 1.0);
-        let steps = [Some(before), after].into_iter().flatten();
+        let steps = [before, after].into_iter().flatten();
         let steps = steps
             .filter(|it| it.photon.object == photon.object)
             .map(|it| in_plane(&photon, &it.photon) / (it.at - own.at));
@@ -319,7 +332,8 @@ impl Edge {
             let ratio = (length / step.length()).min(MAX_RATIO);
             let mut is_fitted = false;
             if after.is_none() {
-                let slope = length / before.photon.axes[self.axis].length();
+                let beside = before.map_or(length, |it| it.photon.axes[self.axis].length());
+                let slope = length / beside;
                 (inwards, extent) = match Silhouette::of(ratio, slope) {
                     Some(silhouette) => {
                         is_fitted = true;

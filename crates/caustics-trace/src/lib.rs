@@ -140,6 +140,7 @@ mod ledger;
 mod live;
 mod live_chunk;
 mod media;
+mod narrow_sheets;
 mod neighbours;
 mod optics;
 mod options;

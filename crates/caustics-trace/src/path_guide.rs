@@ -5,6 +5,10 @@ use glam::Vec3;
 /// Set in the hash of a path whose light landed turned over. It is clear on the way.
 const TURNED: u32 = 0x8000_0000;
 
+/// The most surfaces on a path that is followed by itself. So many turns fit in a word of a graphics
+/// processor, and the light of longer paths is faint.
+pub(crate) const MOST_SURFACES: usize = 28;
+
 /// The hash of a path with one more surface at its end (a step of Fowler, Noll and Vo's hash on
 /// whole words).
 pub(crate) fn extended(path: u32, object: u32, event: u32) -> u32 {
@@ -58,7 +62,7 @@ impl PathGuide {
         self.followed.clear();
     }
 
-    /// Follows one path only, if it has been seen, wherever it lands.
+    /// Follows one path only, if it has been seen and met no more than [`MOST_SURFACES`], wherever it lands.
     pub(crate) fn follow(&mut self, path: u32) -> bool {
         self.followed.clear();
         let mut next = path & !TURNED;
@@ -67,6 +71,9 @@ impl PathGuide {
             let Some(&before) = self.before.get(&next) else {
                 break;
             };
+            if self.followed.len() == MOST_SURFACES {
+                break;
+            }
             self.followed.push(next);
             if before == 0 {
                 return true;

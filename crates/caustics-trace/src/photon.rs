@@ -28,6 +28,13 @@ pub struct Photon {
     pub coverage: Coverage,
 }
 
+impl Photon {
+    /// Whether its position and its axes are.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.position.is_finite() && self.axes.iter().all(|axis| axis.is_finite())
+    }
+}
+
 #[cfg(test)]
 impl Photon {
     /// One of unit flux that fell from above.

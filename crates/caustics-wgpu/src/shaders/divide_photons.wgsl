@@ -1,7 +1,18 @@
 // The last photons of a lattice's rows, divided. Twin: edges.rs in caustics-trace, which says why.
 
-// How often the stretch in which a row's end lies is halved.
+// How often the stretch in which a row's end lies is halved, and that in which a narrow sheet's does.
 const HALVINGS: u32 = 4u;
+const NARROW_HALVINGS: u32 = 3u;
+
+// Searches for the ends of a narrow sheet: of its column, of its row, and of the rows a quarter of the
+// column on either side.
+const NARROW_SEARCHES: u32 = 8u;
+const SEARCHES_ALONE: u32 = 4u;
+
+// Where the parts of a narrow sheet's light begin and end, in its width. Twin: narrow_sheets.rs.
+const STRIPS: u32 = RECORDS_OF_DIVIDED;
+const STRIP_ENDS: array<f32, STRIPS + 1u> = array(0.0, 0.125, 0.375, 0.625, 0.875, 1.0);
+const BRIGHTEST: f32 = 2.0;
 
 // Where in a row's last cell each part begins and ends, from the inside to the edge.
 const STRATA: array<vec2<f32>, PARTS> = array(
@@ -134,6 +145,33 @@ fn is_finite_record(record: FootprintRecord) -> bool {
     return all_finite(record.position) && all_finite(record.axis_u) && all_finite(record.axis_v);
 }
 
+// A part seen from the middle of a narrow sheet towards its end on a side.
+fn outwards(stratum: Stratum, side: f32) -> Stratum {
+    var result = stratum;
+    result.middle *= side;
+    return result;
+}
+
+// Stores what a photon is divided into, if there is room for it.
+fn store_parts(link: u32, parts: array<FootprintRecord, RECORDS_OF_DIVIDED>) {
+    for (var part = 0u; part < RECORDS_OF_DIVIDED; part++) {
+        if !is_finite_record(parts[part]) {
+            return;
+        }
+    }
+    let first = atomicAdd(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
+    if first + RECORDS_OF_DIVIDED > arrayLength(&appended) {
+        // It stays whole.
+        atomicSub(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
+        return;
+    }
+    for (var part = 0u; part < RECORDS_OF_DIVIDED; part++) {
+        appended[first + part] = parts[part];
+    }
+    links[link + 2u] = LINK_DIVIDED | (first + 1u);
+    atomicAdd(&group_divided, 1u);
+}
+
 fn divide_record(place: u32) {
     let photon = appended[place - 1u];
     // Another dispatch is told of its emitter.
@@ -146,65 +184,106 @@ fn divide_record(place: u32) {
     photon_number = photon.photon;
     let emitter = emitter_of(photon.photon);
     let point = point_number(emitter, photon.photon - trace.emitters[emitter].first);
-    let landings = landed_beside(
-        photon, neighbours_of(emitter, photon.photon), sought_path);
+    let beside = neighbours_of(emitter, photon.photon);
+    let landings = landed_beside(photon, beside, sought_path);
 
+    let narrow = narrow_axis(photon, beside, landings);
+    let is_narrow = narrow != NO_AXIS;
+    let across_axis = 1u - min(narrow, 1u);
+    let is_alone = is_narrow && !landings[across_axis][0].is_there && !landings[across_axis][1].is_there;
     var rows: array<Row, 2>;
     var ends = 0u;
-    for (var axis = 0u; axis < 2u; axis++) {
-        if is_end(photon, landings[axis]) {
-            let side = select(-1.0, 1.0, landings[axis][0].is_there);
-            rows[ends] = Row(axis, side, 0.0, inner_of(landings[axis]));
-            ends += 1u;
+    if !is_narrow {
+        for (var axis = 0u; axis < 2u; axis++) {
+            if is_end(photon, landings[axis]) {
+                let side = select(-1.0, 1.0, landings[axis][0].is_there);
+                rows[ends] = Row(axis, side, 0.0, inner_of(landings[axis]));
+                ends += 1u;
+            }
         }
     }
-    // The ends of all rows; how far the row goes half a row on; the parts.
-    let searches = HALVINGS * ends;
-    let slanted = searches + HALVINGS;
+    // The ends of all rows; how far the row goes half a row on; the parts. Of a narrow sheet the searches
+    // that are said above, and its parts.
+    let halvings = select(HALVINGS, NARROW_HALVINGS, is_narrow);
+    let searches = select(
+        ends + 1u, select(NARROW_SEARCHES, SEARCHES_ALONE, is_alone), is_narrow);
+    let searched = halvings * searches;
+    let wanted = select(PARTS, STRIPS, is_narrow);
     var row = rows[0];
-    var reach_beside = 0.0;
+    var reaches: array<f32, NARROW_SEARCHES>;
+    var across = 0.0;
     var width = 0.5;
-    var parts: array<FootprintRecord, PARTS>;
-    var strata: array<Stratum, PARTS>;
+    var lit_rows = 0.0;
+    var middle_row = 0.0;
+    var cells = 0.0;
+    var middle = 0.0;
+    var parts: array<FootprintRecord, STRIPS>;
+    var strata: array<Stratum, STRIPS>;
     var parts_found = 0u;
-    for (var step = 0u; step < slanted + PARTS; step++) {
-        if step < slanted && step % HALVINGS == 0u {
+    for (var step = 0u; step < searched + wanted; step++) {
+        let search = step / halvings;
+        if step < searched && step % halvings == 0u {
             width = 0.5;
-            if step < searches {
-                row = rows[step / HALVINGS];
+            across = 0.0;
+            reaches[search] = 0.0;
+            if is_narrow {
+                if search == 2u {
+                    lit_rows = reaches[0] + reaches[1];
+                    middle_row = 0.5 * (reaches[1] - reaches[0]);
+                }
+                row.axis = select(narrow, across_axis, search < 2u);
+                let is_upper = select((search & 1u) == 1u, search >= 6u, search >= 4u);
+                row.side = select(-1.0, 1.0, is_upper);
+                if search >= 2u {
+                    across = middle_row;
+                }
+                if search >= 4u {
+                    across += select(-0.25, 0.25, (search & 1u) == 0u) * lit_rows;
+                }
+            } else if search < ends {
+                row = rows[search];
+            } else {
+                row = rows[0];
+                // The axis that crosses the edge the more steeply.
+                if ends == 2u && reaches[1] < reaches[0] {
+                    row = rows[1];
+                }
+                across = 0.5;
+                row.reach = select(reaches[0], reaches[1], ends == 2u && reaches[1] < reaches[0]);
+                reaches[search] = row.reach - 0.5;
             }
         }
-        if step == searches {
-            row = rows[0];
-            // The axis that crosses the edge the more steeply.
-            if ends == 2u && rows[1].reach < rows[0].reach {
-                row = rows[1];
+        if is_narrow && search < 2u && landings[across_axis][search].is_there {
+            // The column goes on.
+            reaches[search] = 0.5;
+            continue;
+        }
+        if step == searched {
+            if is_narrow {
+                cells = reaches[2] + reaches[3];
+                middle = 0.5 * (reaches[3] - reaches[2]);
+                row = Row(narrow, 1.0, 0.0, row.inner);
+                across = middle_row;
+            } else {
+                cells = 0.5 + row.reach;
+                across = 0.0;
             }
-            reach_beside = row.reach - 0.5;
         }
         var along = 0.0;
-        var across = 0.0;
-        let part = step - slanted;
-        if step < searches {
-            along = row.reach + width;
-        } else if step < slanted {
-            along = reach_beside + width;
-            across = 0.5;
+        let part = step - searched;
+        if step < searched {
+            along = reaches[search] + width;
+        } else if is_narrow {
+            along = middle + (0.5 * (STRIP_ENDS[part] + STRIP_ENDS[part + 1u]) - 0.5) * cells;
         } else {
-            along = 0.5 * (STRATA[part].x + STRATA[part].y) * (0.5 + row.reach) - 0.5;
+            along = 0.5 * (STRATA[part].x + STRATA[part].y) * cells - 0.5;
         }
         probe(emitter, point, row_offset(row, along, across));
-        if step < slanted {
+        if step < searched {
             let gain = select(0.0, width, is_probed);
             width *= 0.5;
-            let is_last = step % HALVINGS == HALVINGS - 1u;
-            let more = gain + select(0.0, width, is_last);
-            if step < searches {
-                row.reach += more;
-                rows[step / HALVINGS] = row;
-            } else {
-                reach_beside += more;
-            }
+            let is_last = step % halvings == halvings - 1u;
+            reaches[search] += gain + select(0.0, width, is_last);
         } else if is_probed {
             parts[part] = probed;
             strata[part] = Stratum(
@@ -212,11 +291,50 @@ fn divide_record(place: u32) {
             parts_found += 1u;
         }
     }
-    if parts_found < PARTS {
+    if parts_found < wanted {
         return;
     }
-    let slant = 2.0 * row.side * (reach_beside - row.reach);
-    let cells = 0.5 + row.reach;
+    if is_narrow {
+        let slants = select(
+            2.0 * vec2(reaches[5] - reaches[4], reaches[6] - reaches[7]), vec2(0.0), is_alone);
+        let whole = max(cells, 1.0) * select(lit_rows, max(lit_rows, 1.0), is_alone);
+        let weight = min(whole, BRIGHTEST * cells * lit_rows) / cells;
+        let shortening = checked_ratio(photon, axis_of(photon, across_axis), landings[across_axis]);
+        let narrowing = min(shortening, lit_rows);
+        for (var part = 0u; part < STRIPS; part++) {
+            // Outwards from the middle.
+            let is_low = part < STRIPS / 2u;
+            row.side = select(1.0, -1.0, is_low);
+            let below = outwards(strata[max(part, 1u) - 1u], row.side);
+            let above = outwards(strata[min(part + 1u, STRIPS - 1u)], row.side);
+            let is_last = part == 0u || part == STRIPS - 1u;
+            var before = below;
+            var after = above;
+            if is_low {
+                before = above;
+                after = below;
+            }
+            let at = 0.5 * (STRIP_ENDS[part] + STRIP_ENDS[part + 1u]);
+            let strip_width = (STRIP_ENDS[part + 1u] - STRIP_ENDS[part]) * cells;
+            parts[part].flux_r *= weight;
+            parts[part].flux_g *= weight;
+            parts[part].flux_b *= weight;
+            parts[part] = part_of(
+                parts[part],
+                row,
+                narrowing,
+                slants.x + (slants.y - slants.x) * at,
+                strip_width,
+                outwards(strata[part], row.side),
+                before,
+                after,
+                !is_last,
+            );
+        }
+        store_parts(link, parts);
+        return;
+    }
+    let slant = 2.0 * row.side * (reaches[ends] - row.reach);
     // Along the edge the photon's neighbours may have landed nearer than its differential says.
     var narrowing = 1.0;
     if ends == 1u {
@@ -258,7 +376,6 @@ fn divide_record(place: u32) {
     }
     var back = parts[0];
     var flux_back = vec3(0.0);
-    var is_sound = true;
     for (var part = 0u; part < PARTS; part++) {
         let flux = flux_of(parts[part]);
         let flux_kept = rounded_vector(kept[part] * flux);
@@ -266,7 +383,6 @@ fn divide_record(place: u32) {
         parts[part].flux_r = flux_kept.x;
         parts[part].flux_g = flux_kept.y;
         parts[part].flux_b = flux_kept.z;
-        is_sound = is_sound && is_finite_record(parts[part]);
     }
     back.flux_r = flux_back.x;
     back.flux_g = flux_back.y;
@@ -277,22 +393,8 @@ fn divide_record(place: u32) {
     } else {
         back.axis_v = GIVE_BACK_WIDTH * inner_unit;
     }
-    is_sound = is_sound && is_finite_record(back);
-    if !is_sound {
-        return;
-    }
-    let first = atomicAdd(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
-    if first + RECORDS_OF_DIVIDED > arrayLength(&appended) {
-        // It stays whole.
-        atomicSub(&counters[COUNTER_STORED], RECORDS_OF_DIVIDED);
-        return;
-    }
-    for (var part = 0u; part < PARTS; part++) {
-        appended[first + part] = parts[part];
-    }
-    appended[first + PARTS] = back;
-    links[link + 2u] = LINK_DIVIDED | (first + 1u);
-    atomicAdd(&group_divided, 1u);
+    parts[PARTS] = back;
+    store_parts(link, parts);
 }
 
 @compute @workgroup_size(EDGE_WORKGROUP_SIZE)

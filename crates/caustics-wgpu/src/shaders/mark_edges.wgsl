@@ -28,7 +28,8 @@ fn mark_photon(photon: u32) {
             && (links[link + 2u] & TURN_TOO_MANY) == 0u
             && largest(flux_of(record)) >= SIGNIFICANT * brightest {
             let landings = landed_beside(record, beside, links[link + 1u]);
-            if is_end(record, landings[0]) || is_end(record, landings[1]) {
+            if is_end(record, landings[0]) || is_end(record, landings[1])
+                || narrow_axis(record, beside, landings) != NO_AXIS {
                 let index = atomicAdd(&counters[COUNTER_EDGES], 1u);
                 links[trace.first_edge + index] = place;
                 if index % EDGE_WORKGROUP_SIZE == 0u
