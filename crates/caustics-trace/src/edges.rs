@@ -38,6 +38,9 @@ const SIGNIFICANT: f32 = 0.1;
 /// into strata, each of which is traced as a photon of its own, with a footprint as wide as it is. How
 /// the end runs from row to row, half a row on, gives the slant of the strata.
 ///
+/// A sheet that ends on both sides of a photon is narrower than that: see
+/// [`divide_narrow`](Self::divide_narrow).
+///
 /// Cells at edges are few: of N cells as many as the root of N, so that all this costs less the more
 /// photons there are.
 pub(crate) struct EdgeTracer<'a, 'b, I: ?Sized> {

@@ -9,7 +9,7 @@ use crate::photon::Photon;
 const HALVINGS: u32 = 3;
 
 /// Parts of the light of a narrow sheet.
-pub(crate) const STRIPS: usize = PARTS + 1;
+const STRIPS: usize = PARTS + 1;
 
 /// The parts' ends, in the width of the sheet.
 const ENDS: [f32; STRIPS + 1] = [0.0, 0.125, 0.375, 0.625, 0.875, 1.0];

@@ -68,10 +68,11 @@ pub struct TraceOptions {
     /// without.
     pub guide_emission: bool,
     /// Whether footprints on a lattice are checked against where neighbours landed, shortened where
-    /// those are nearer, and drawn in at the edges of sheets of light.
+    /// those are nearer, averaged with them where they agree, and drawn in at the edges of sheets of light.
     pub check_footprints: bool,
     /// Whether the last photons of a lattice's rows are divided, where a sheet of light ends: a few more
-    /// rays find where, and what of the cell is left is traced in parts. Edges become sharp and stand
+    /// rays find where, and what of the cell is left is traced in parts, as is the light of sheets that are
+    /// narrower than a cell. Edges become sharp and stand
     /// where they are, and what lands near a silhouette is where it is: without, the error of the ten
     /// scenes of `docs/footprints.md` is 2.3 times as large in the mean. It takes a twentieth to a half
     /// more rays there at 262,144 photons, and less where there are more. It needs

@@ -101,7 +101,7 @@ pub enum FootprintSource {
     /// one went on.
     Thinned,
     /// From the ray differential of a part of its cell, or the finite difference to the part beside
-    /// it: a sheet of light ends there ([`TraceOptions::divide_edges`]).
+    /// it: a sheet of light ends there, or is narrower than a cell ([`TraceOptions::divide_edges`]).
     ///
     /// [`TraceOptions::divide_edges`]: crate::TraceOptions::divide_edges
     Divided,

@@ -130,9 +130,10 @@
 //! # Limits
 //!
 //! The tracer numbers at most 2¹⁶ dielectrics, and binds each kind of data whole: two million triangles
-//! in 128 MiB, which the texels of an environment share, 16 bytes each. Where there is no room for all records of a batch, which of them are lost is another
-//! matter in every run; a photon whose parts have none is [not divided](caustics_trace::TraceOptions::divide_edges)
-//! at the edge of a sheet of light, nor is one whose path met more than 28 surfaces. Footprints that
+//! in 128 MiB, which the texels of an environment share, 16 bytes each. Where there is no room for all
+//! records of a batch, which of them are lost is another matter in every run; a photon whose parts have
+//! none is [not divided](caustics_trace::TraceOptions::divide_edges) at the edge of a sheet of light.
+//! Footprints that
 //! [may be reflected](caustics_trace::TraceOptions::reflect_at_boundaries) are tried at every end of
 //! their receiver: one with thousands of ends takes its time. Batches that are
 //! smaller than all photons trace a row of the lattice on either side again, for the check of

@@ -6,7 +6,7 @@ use caustics_geometry::TriangleMesh;
 use caustics_scene::{Light, Material, Scene};
 use caustics_trace::glam::{Quat, Vec3};
 use caustics_trace::{
-    Branching, Fate, FootprintSource, Photon, PhotonMap, TraceOptions, fresnel_schlick,
+    Aim, Branching, Fate, FootprintSource, Photon, PhotonMap, TraceOptions, fresnel_schlick,
     trace_photons,
 };
 
@@ -24,12 +24,11 @@ const HALVES: [f32; 2] = [0.31, 0.2];
 /// Where the mirror hangs, below a lamp and a ceiling.
 const HEIGHT: f32 = 2.0;
 
-/// A flat mirror, turned by some angles, that throws a lamp's light at the ceiling: the scene, and the
+/// A flat mirror with these halves of its sides, turned by some angles, that throws a lamp's light at the ceiling: the scene, and the
 /// mirror's corners.
-fn mirror(roll: f32) -> (Scene, [Vec3; 4]) {
+fn mirror([a, b]: [f32; 2], roll: f32) -> (Scene, [Vec3; 4]) {
     let turned = Quat::from_rotation_x(0.4) * Quat::from_rotation_y(roll);
     let corner = |x: f32, z: f32| HEIGHT * Vec3::Y + turned * Vec3::new(x, 0.0, z);
-    let [a, b] = HALVES;
     let corners = [corner(-a, b), corner(a, b), corner(a, -b), corner(-a, -b)];
     let mesh = TriangleMesh::with_flat_normals(&corners, &[[0, 1, 2], [0, 2, 3]]);
     let scene = under_a_lamp(mesh.expect("a valid mirror"));
@@ -75,7 +74,7 @@ fn integral(from: f64, to: f64, value: impl Fn(f64) -> f64) -> f64 {
 fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
     let (mut worst, mut whole_error, mut divided_error) = (0.0f64, 0.0, 0.0);
     for number in 0..8 {
-        let (scene, corners) = mirror(0.1 + 0.19 * number as f32);
+        let (scene, corners) = mirror(HALVES, 0.1 + 0.19 * number as f32);
         let options = TraceOptions {
             photons: 3000,
             ..TraceOptions::default()
@@ -119,6 +118,37 @@ fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
         divided_error < 0.5 * whole_error,
         "{divided_error} {whole_error}"
     );
+}
+
+#[test]
+fn light_of_a_mirror_narrower_than_a_cell_stays_on_its_image() {
+    let (mut light_whole, mut light_divided) = (0.0, 0.0);
+    for number in -4..=4i8 {
+        // A cell is 17 mm wide there, and the mirror lies nearly along the rows.
+        let (scene, corners) = mirror([0.31, 0.006], 0.06 * f32::from(number));
+        let options = TraceOptions {
+            photons: 1024,
+            aim: Aim::Cones,
+            guide_emission: false,
+            ..TraceOptions::default()
+        };
+        let divided = trace(&scene, &options);
+        let whole = TraceOptions {
+            divide_edges: false,
+            ..options
+        };
+        let whole = trace(&scene, &whole);
+        let [spilt_whole, spilt_divided] =
+            [&whole, &divided].map(|map| spilt(map, |at| is_outside(at, &corners)));
+        assert!(
+            spilt_divided < 0.4 * spilt_whole,
+            "{number}: {spilt_divided} outside for {spilt_whole}"
+        );
+        light_whole += flux(&whole);
+        light_divided += flux(&divided);
+    }
+    let ratio = light_divided / light_whole;
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
 }
 
 #[test]
