@@ -227,6 +227,15 @@ pub(crate) fn in_plane(photon: &Photon, other: &Photon) -> Vec3 {
     displacement - photon.normal * displacement.dot(photon.normal)
 }
 
+/// From where a photon landed to where another's light would meet its receiver's plane, if it came from the
+/// same side: on a curved receiver other points of that plane than those below where it landed, and the
+/// differential says where they are.
+fn along_light(photon: &Photon, other: &Photon) -> Vec3 {
+    let displacement = other.position - photon.position;
+    let height = displacement.dot(photon.normal) / photon.incoming.dot(photon.normal);
+    displacement - photon.incoming * height
+}
+
 enum Edge {
     Even,
     Silhouette(Silhouette),
@@ -258,8 +267,11 @@ impl Landed {
         let slope = length / beside.length();
         let edge =
             is_edge.then(|| Silhouette::of(ratio, slope).map_or(Edge::Even, Edge::Silhouette));
-        let between = match steps {
-            [Some((before, _)), Some((after, _))] => Between::of(before, after, axis, length),
+        let between = match (pair, steps) {
+            ([Some(before), Some(after)], [Some(_), Some(_)]) => {
+                let [before, after] = [before, after].map(|it| along_light(photon, it));
+                Between::of(before, after, axis, length)
+            }
             _ => None,
         };
         Some(Self {

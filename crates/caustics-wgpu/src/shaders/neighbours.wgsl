@@ -73,6 +73,12 @@ fn silhouette_fit(ratio: f32, x: f32) -> vec2<f32> {
     return vec2(scale * (mean - sqrt(x)), SILHOUETTE_EXTENT * scale * width);
 }
 
+// Where light at a displacement from a photon, from the same side, meets its receiver's plane.
+fn along_light(photon: FootprintRecord, displacement: vec3<f32>) -> vec3<f32> {
+    let height = dot(displacement, photon.normal) / dot(photon.incoming, photon.normal);
+    return displacement - photon.incoming * height;
+}
+
 // By the steps to the neighbours before and after a photon, its axis and that axis' length.
 fn between_of(before: vec3<f32>, after: vec3<f32>, axis: vec3<f32>, length: f32) -> Between {
     var between: Between;
@@ -126,7 +132,8 @@ fn landing_of(
         landing.ratio = min(length / distance, MAX_RATIO);
     }
     if has_before && has_after {
-        landing.between = between_of(before_in_plane, after_in_plane, axis, length);
+        landing.between = between_of(
+            along_light(photon, to_before), along_light(photon, to_after), axis, length);
     }
     landing.is_edge = before.is_there != after.is_there;
     if landing.is_edge && landing.ratio > LEAST_SILHOUETTE {
