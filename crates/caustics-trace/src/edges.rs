@@ -104,6 +104,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
         let neighbours = lattice.lattice.neighbours(point);
         for (index, footprint) in own.zip(lattice.checked(point)) {
             let photon = &lattice.photons[index];
+            // Of longer paths the way would not be known, after all of a point's were traced for it.
             let is_worth_it = photon.source != FootprintSource::Thinned
                 && photon.events as usize <= MOST_SURFACES
                 && flux(photon) >= SIGNIFICANT * brightest;
@@ -112,9 +113,7 @@ impl<'a, 'b, I: Intersect + ?Sized> EdgeTracer<'a, 'b, I> {
             let number = lattice.lattice.number(point);
             let is_divided = is_worth_it
                 && match narrow_axis(photon, &neighbours, &landed) {
-                    Some(axis) => {
-                        self.divide_narrow(photon, [number, path], axis, &landed, checked)
-                    }
+                    Some(axis) => self.divide_narrow(photon, number, path, axis, &landed, checked),
                     None => self.divide(photon, number, path, &landed, checked),
                 };
             if is_divided {

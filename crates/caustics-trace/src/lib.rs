@@ -121,6 +121,7 @@
 //! - Silverman, *Density Estimation for Statistics and Data Analysis*, 1986, section 2.10 (reflection).
 
 mod area_emission;
+mod between;
 mod boundary;
 mod casters;
 mod compact;

@@ -4,8 +4,9 @@ use glam::Vec3;
 use crate::edges::{Edge, EdgeTracer, PARTS, Row, Stratum, checked_ratio};
 use crate::photon::Photon;
 
-/// How often the stretch in which an end lies is halved. With one more the error of the scene of
-/// three glasses is the same, for a quarter more rays.
+/// How often the stretch in which an end lies is halved. With one more the error of a scene of three
+/// glasses is at most 2 % less, and a fifth more time goes into tracing; with one less that of a brass ring is
+/// a quarter more.
 const HALVINGS: u32 = 3;
 
 /// Parts of the light of a narrow sheet.
@@ -48,7 +49,8 @@ impl<I: Intersect + ?Sized> EdgeTracer<'_, '_, I> {
     pub(crate) fn divide_narrow(
         &mut self,
         photon: &Photon,
-        [number, path]: [u32; 2],
+        number: u32,
+        path: u32,
         axis: usize,
         landed: &[[Option<&Photon>; 2]; 2],
         divided: &mut Vec<Photon>,

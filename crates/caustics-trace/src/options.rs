@@ -72,10 +72,10 @@ pub struct TraceOptions {
     pub check_footprints: bool,
     /// Whether the last photons of a lattice's rows are divided, where a sheet of light ends: a few more
     /// rays find where, and what of the cell is left is traced in parts, as is the light of sheets that are
-    /// narrower than a cell. Edges become sharp and stand
-    /// where they are, and what lands near a silhouette is where it is: without, the error of the ten
-    /// scenes of `docs/footprints.md` is 2.3 times as large in the mean. It takes a twentieth to a half
-    /// more rays there at 262,144 photons, and less where there are more. It needs
+    /// narrower than a cell; light that met more than 28 surfaces is not. Edges become sharp and stand where
+    /// they are, and what lands near a silhouette is where it is: without, the error of the ten scenes of
+    /// `docs/footprints.md` is 2.3 times as large in the mean. It takes a twentieth to a half more rays there
+    /// at 262,144 photons, and less where there are more. It needs
     /// [`check_footprints`](Self::check_footprints) and [`Branching::SplitAll`], and does nothing without.
     pub divide_edges: bool,
     /// Whether footprints that [overlap](crate::Coverage::Overlap) are reflected where their receiver ends, so

@@ -120,6 +120,9 @@ macro_rules! divider_pieces {
             "neighbours",
             "photon_beside",
             "edge_rows",
+            "edge_parts",
+            "give_back",
+            "narrow_sheets",
             "divide_photons"
         )
     };

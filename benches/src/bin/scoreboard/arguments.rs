@@ -15,7 +15,7 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --ladder N,N         further counts, for the default estimate alone
                        (default: 1024,4096,16384,1048576,4194304; `none` for none)
   --counted N          photons of the picture that tells a reference's noise from errors, not timed
-                       (default: 32000000; 0 for none)
+                       (default: 16000000; 0 for none)
   --runs N             runs that a median is taken of, at most (default: 5)
   --patience S         seconds after which no further run starts (default: 3)
   --threads N          threads (default: as many as there are cores)
@@ -62,7 +62,7 @@ impl Arguments {
             estimates: Estimate::ALL.to_vec(),
             photons: vec![65_536, 262_144, 2_000_000],
             ladder: vec![1024, 4096, 16_384, 1_048_576, 4_194_304],
-            counted: 32_000_000,
+            counted: 16_000_000,
             patience: Patience {
                 runs: 5,
                 seconds: 3.0,

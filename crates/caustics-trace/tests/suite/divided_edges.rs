@@ -18,14 +18,25 @@ fn trace(scene: &Scene, options: &TraceOptions) -> PhotonMap {
     trace_photons(&world, &intersector, options, &|_| {}).expect("valid options")
 }
 
+/// Without and with photons divided.
+fn whole_and_divided(scene: &Scene, options: TraceOptions) -> [PhotonMap; 2] {
+    [false, true].map(|divide_edges| {
+        let options = TraceOptions {
+            divide_edges,
+            ..options
+        };
+        trace(scene, &options)
+    })
+}
+
 /// Half the sides of a mirror.
 const HALVES: [f32; 2] = [0.31, 0.2];
 
 /// Where the mirror hangs, below a lamp and a ceiling.
 const HEIGHT: f32 = 2.0;
 
-/// A flat mirror with these halves of its sides, turned by some angles, that throws a lamp's light at the ceiling: the scene, and the
-/// mirror's corners.
+/// A flat mirror with these halves of its sides, turned by some angles, that throws a lamp's light at the
+/// ceiling: the scene, and the mirror's corners.
 fn mirror([a, b]: [f32; 2], roll: f32) -> (Scene, [Vec3; 4]) {
     let turned = Quat::from_rotation_x(0.4) * Quat::from_rotation_y(roll);
     let corner = |x: f32, z: f32| HEIGHT * Vec3::Y + turned * Vec3::new(x, 0.0, z);
@@ -79,14 +90,7 @@ fn a_mirrors_image_ends_where_it_does_and_has_its_light() {
             photons: 3000,
             ..TraceOptions::default()
         };
-        let divided = trace(&scene, &options);
-        let whole = trace(
-            &scene,
-            &TraceOptions {
-                divide_edges: false,
-                ..options
-            },
-        );
+        let [whole, divided] = whole_and_divided(&scene, options);
         // The lamp's light on the mirror, by its parts as small as a point.
         let normal = (corners[1] - corners[0]).cross(corners[3] - corners[0]);
         let area = f64::from(normal.length());
@@ -132,12 +136,7 @@ fn light_of_a_mirror_narrower_than_a_cell_stays_on_its_image() {
             guide_emission: false,
             ..TraceOptions::default()
         };
-        let divided = trace(&scene, &options);
-        let whole = TraceOptions {
-            divide_edges: false,
-            ..options
-        };
-        let whole = trace(&scene, &whole);
+        let [whole, divided] = whole_and_divided(&scene, options);
         let [spilt_whole, spilt_divided] =
             [&whole, &divided].map(|map| spilt(map, |at| is_outside(at, &corners)));
         assert!(
@@ -158,12 +157,7 @@ fn what_is_divided_is_counted_and_nothing_is_where_the_rest_stays() {
         photons: 10_000,
         ..TraceOptions::default()
     };
-    let divided = trace(&scene, &options);
-    let whole_options = TraceOptions {
-        divide_edges: false,
-        ..options
-    };
-    let whole = trace(&scene, &whole_options);
+    let [whole, divided] = whole_and_divided(&scene, options);
     let parts = |map: &PhotonMap| {
         let parts = map.photons.iter();
         let parts = parts.filter(|it| it.source == FootprintSource::Divided);
