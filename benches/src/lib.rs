@@ -19,6 +19,7 @@ pub mod photons;
 pub mod random;
 pub mod rays;
 pub mod receivers;
+pub mod renderers;
 pub mod score;
 pub mod stage;
 pub mod timing;

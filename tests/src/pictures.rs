@@ -64,6 +64,8 @@ pub struct PictureError {
     pub median: f64,
     /// 99.99th percentile of the same.
     pub outliers: f64,
+    /// 99.99th percentile over lit pixels of |t - r| / (r + mean r).
+    pub off_by: f64,
     /// Where the largest error is: column and row.
     pub worst: [usize; 2],
 }
@@ -303,18 +305,24 @@ impl ExactPicture {
         let relative = |(test, exact): (&f64, &f64)| {
             (test - exact).powi(2) / (exact * exact + 0.01 * mean * mean)
         };
-        let mut lit: Vec<(f64, usize)> = pairs()
-            .zip(0..)
-            .filter(|((_, exact), _)| **exact > LIT * mean)
-            .map(|((test, exact), pixel)| ((test - exact).abs() / mean, pixel))
-            .collect();
-        lit.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let at = |part: f64| lit[((part * lit.len() as f64) as usize).min(lit.len() - 1)];
+        let sorted = |steady: &dyn Fn(f64) -> f64| {
+            let mut lit: Vec<(f64, usize)> = pairs()
+                .zip(0..)
+                .filter(|((_, exact), _)| **exact > LIT * mean)
+                .map(|((test, exact), pixel)| ((test - exact).abs() / steady(*exact), pixel))
+                .collect();
+            lit.sort_by(|a, b| a.0.total_cmp(&b.0));
+            lit
+        };
+        let (lit, relative_to_pixels) = (sorted(&|_| mean), sorted(&|exact| exact + mean));
+        let rank = |part: f64| ((part * lit.len() as f64) as usize).min(lit.len() - 1);
+        let at = |part: f64| lit[rank(part)];
         let worst = lit[lit.len() - 1].1;
         PictureError {
             relative_mse: pairs().map(relative).sum::<f64>() / picture.len() as f64,
             median: at(0.5).0,
             outliers: at(0.9999).0,
+            off_by: relative_to_pixels[rank(0.9999)].0,
             worst: [worst % SIZE, worst / SIZE],
         }
     }

@@ -27,7 +27,7 @@ const FITTED: u32 = 16;
 /// What the table of curved receivers says.
 const CURVED_FOUND: &str = "\n\
     On ripples of curvature 30 the error of footprints that are followed is a fifth of the plain planes'\n\
-    and less from 2^12 on, and a fiftieth at 2^12; with 2^10, footprints are as long as ripples. On what\n\
+    and less from 2^12 on, and a thirtieth at 2^12; with 2^10, footprints are as long as ripples. On what\n\
     hardly curves, 3 for ripples and 1 under the lens, it makes a few percent of difference. Under the\n\
     lens at 3 plain planes have 5 to 50 % less. Likely causes, not told apart: each footprint follows\n\
     its own photon, as though its light were parallel, because nothing is known of how it converges; and\n\
@@ -165,6 +165,14 @@ fn document(series: &[Series], curved: &[Curved]) -> String {
             median, outliers, ..
         } = one.errors[index].1;
         format!("{:.0}", outliers / median)
+    });
+    text.push_str(
+        "\nA firefly is a pixel that is much brighter than it should be. By how much one pixel in 10,000 is off\n\
+         at least, in its own exact irradiance and the mean of all: the 99.99th percentile of\n\
+         |t - r| / (r + mean r) over lit pixels.\n\n",
+    );
+    table(&mut text, series, &powers, "", |one, index| {
+        format!("{:.4}", one.errors[index].1.off_by)
     });
     curved_receivers(&mut text, curved);
     text

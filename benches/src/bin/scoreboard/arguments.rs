@@ -13,7 +13,7 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --estimates A,B      estimates (default: all)
   --photons N,N        photons emitted (default: 65536,262144,2000000)
   --ladder N,N         further counts, for the default estimate alone
-                       (default: 1024,4096,16384,1048576,4194304; `none` for none)
+                       (default: 1024,4096,16384,32768,1048576,4194304; `none` for none)
   --counted N          photons of the picture that tells a reference's noise from errors, not timed
                        (default: 16000000; 0 for none)
   --runs N             runs that a median is taken of, at most (default: 5)
@@ -27,6 +27,9 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --images FOLDER      keeps the pictures as EXR
   --noise-csv FILE     the references' noise (default: benches/data/noise.csv)
   --peers FILE         other renderers' rows (default: benches/data/peers.csv)
+  --renderers yes      has other renderers render the scenes as well: Mitsuba 3 (PyPI, with a libLLVM of 16
+                       or newer) and POV-Ray, whichever is installed
+  --renderers-csv FILE their rows (default: benches/data/renderers.csv)
   --measure no         measures nothing, rewrites tables and charts from the CSV
   --full yes           measures caustics seen through glass and in mirrors, too, on the scenes that
                        have a reference of them (p01, p08, p10), at the counts of --photons
@@ -50,6 +53,8 @@ pub(crate) struct Arguments {
     pub(crate) peers: PathBuf,
     pub(crate) noise_csv: PathBuf,
     pub(crate) measures: bool,
+    pub(crate) measures_renderers: bool,
+    pub(crate) renderers_csv: PathBuf,
     pub(crate) measures_full: bool,
     pub(crate) full_csv: PathBuf,
 }
@@ -61,7 +66,7 @@ impl Arguments {
             scenes: SCENES.map(str::to_owned).to_vec(),
             estimates: Estimate::ALL.to_vec(),
             photons: vec![65_536, 262_144, 2_000_000],
-            ladder: vec![1024, 4096, 16_384, 1_048_576, 4_194_304],
+            ladder: vec![1024, 4096, 16_384, 32_768, 1_048_576, 4_194_304],
             counted: 16_000_000,
             patience: Patience {
                 runs: 5,
@@ -76,6 +81,8 @@ impl Arguments {
             peers: root.join("benches/data/peers.csv"),
             noise_csv: root.join("benches/data/noise.csv"),
             measures: true,
+            measures_renderers: false,
+            renderers_csv: root.join("benches/data/renderers.csv"),
             measures_full: false,
             full_csv: root.join("benches/data/full.csv"),
         }
@@ -126,6 +133,8 @@ impl Arguments {
             "--images" => self.images = Some(value.into()),
             "--peers" => self.peers = value.into(),
             "--noise-csv" => self.noise_csv = value.into(),
+            "--renderers" => self.measures_renderers = value != "no",
+            "--renderers-csv" => self.renderers_csv = value.into(),
             "--full" => self.measures_full = value != "no",
             "--full-csv" => self.full_csv = value.into(),
             "--measure" => self.measures = value != "no",

@@ -23,6 +23,16 @@ pub(crate) fn all(rows: &[Row], peers: &[PeerRow]) -> Vec<(&'static str, String)
     ]
 }
 
+/// The tables of other renderers that were measured in the same run.
+pub(crate) fn of_renderers(rows: &[Row], renderers: &[PeerRow]) -> Vec<(&'static str, String)> {
+    let table = |metric| peer_table(rows, renderers, metric);
+    vec![
+        ("renderers", table(Metric::RelativeMse)),
+        ("renderers-trimmed", table(Metric::Trimmed)),
+        ("renderers-best", strongest_peers(rows, renderers)),
+    ]
+}
+
 /// Three significant figures.
 pub(crate) fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
