@@ -1,13 +1,13 @@
 //! Other renderers, run and scored beside this project's estimates.
 //!
 //! A script of `benches/scripts/renderers` for each knows how to put a scene to it, and prints a line for
-//! every picture. What pictures have in common is here: which pixels count, and the exposure.
+//! every picture. What pictures have in common is here: which pixels count, and what is taken off.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use caustics::filter::{Comparison, Image, read_exr};
+use caustics::filter::{Comparison, read_exr};
 
 use crate::fields::Fields;
 use crate::receivers::receivers;
@@ -17,9 +17,6 @@ use crate::stage::{Failure, Stage, scene_folder};
 /// The scripts that put scenes to renderers.
 const SCRIPTS: [&str; 2] = ["mitsuba_light_tracing.py", "povray_photons.py"];
 
-/// The part of the mean that steadies relMSE.
-const FLOOR: f64 = 0.1;
-
 /// Another renderer's picture, timed and scored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RendererRow {
@@ -27,15 +24,13 @@ pub struct RendererRow {
     pub result: PeerRow,
     /// The renderer's version.
     pub version: String,
-    /// What its picture was multiplied by.
-    pub exposure: f64,
     /// Sum of the picture over that of the reference.
     pub energy_ratio: f64,
     /// Under what it was measured.
     pub conditions: Conditions,
 }
 
-const HEADER: &str = "peer,scene,setting,seconds,relmse,relmse_trim1,version,exposure,energy_ratio,\
+const HEADER: &str = "peer,scene,setting,seconds,relmse,relmse_trim1,version,energy_ratio,\
 threads,machine,date,commit";
 
 impl RendererRow {
@@ -56,8 +51,8 @@ impl RendererRow {
         } = &self.conditions;
         format!(
             "{peer},{scene},{setting},{seconds:.4},{relative_mse:.6e},{relative_mse_trimmed:.6e},{},\
-             {:.5},{:.5},{threads},{machine},{date},{commit}",
-            self.version, self.exposure, self.energy_ratio,
+             {:.5},{threads},{machine},{date},{commit}",
+            self.version, self.energy_ratio,
         )
     }
 
@@ -73,13 +68,12 @@ impl RendererRow {
                 relative_mse_trimmed: fields.number(5)?,
             },
             version: fields.text(6).to_owned(),
-            exposure: fields.number(7)?,
-            energy_ratio: fields.number(8)?,
+            energy_ratio: fields.number(7)?,
             conditions: Conditions {
-                threads: fields.number(9)?,
-                machine: fields.text(10).to_owned(),
-                date: fields.text(11).to_owned(),
-                commit: fields.text(12).to_owned(),
+                threads: fields.number(8)?,
+                machine: fields.text(9).to_owned(),
+                date: fields.text(10).to_owned(),
+                commit: fields.text(11).to_owned(),
             },
         })
     }
@@ -120,13 +114,12 @@ pub fn measure(stage: &Stage, conditions: &Conditions) -> Result<Vec<RendererRow
             let picture = Picture::parse(line)?;
             let row = picture.scored(stage, &scored, conditions)?;
             eprintln!(
-                "{:<40} {:8.3} s  relMSE {:.5}  trimmed {:.5}  energy {:.4}  exposure {:.4}",
+                "{:<40} {:8.3} s  relMSE {:.5}  trimmed {:.5}  energy {:.4}",
                 format!("{}-{}-{}", stage.name, row.result.peer, row.result.setting),
                 row.result.seconds,
                 row.result.relative_mse,
                 row.result.relative_mse_trimmed,
                 row.energy_ratio,
-                row.exposure,
             );
             rows.push(row);
         }
@@ -169,8 +162,6 @@ struct Picture {
     version: String,
     setting: String,
     seconds: f64,
-    /// Whether it is in units of its own.
-    is_fitted: bool,
     file: PathBuf,
     /// The light in it that is no caustic.
     other: PathBuf,
@@ -179,7 +170,7 @@ struct Picture {
 impl Picture {
     fn parse(line: &str) -> Result<Self, Failure> {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let [renderer, version, setting, seconds, units, file, other] = words[..] else {
+        let [renderer, version, setting, seconds, file, other] = words[..] else {
             return Err(format!("a script printed: {line}").into());
         };
         Ok(Self {
@@ -187,7 +178,6 @@ impl Picture {
             version: version.to_owned(),
             setting: setting.to_owned(),
             seconds: seconds.parse()?,
-            is_fitted: units == "fitted",
             file: file.into(),
             other: other.into(),
         })
@@ -211,18 +201,11 @@ impl Picture {
                 *value -= other;
             }
         }
-        let exposure = if self.is_fitted {
-            fitted_exposure(&image, reference, scored)
-        } else {
-            1.0
-        };
         let pixels = image.pixels_mut().iter_mut().zip(reference.pixels());
         for ((pixel, of_reference), &is_scored) in pixels.zip(scored) {
-            *pixel = if is_scored {
-                pixel.map(|value| exposure as f32 * value)
-            } else {
-                *of_reference
-            };
+            if !is_scored {
+                *pixel = *of_reference;
+            }
         }
         let comparison = Comparison::new(&image, reference)?;
         Ok(RendererRow {
@@ -235,7 +218,6 @@ impl Picture {
                 relative_mse_trimmed: comparison.relative_mse_trimmed,
             },
             version: self.version.clone(),
-            exposure,
             energy_ratio: comparison.energy_ratio,
             conditions: conditions.clone(),
         })
@@ -265,26 +247,6 @@ fn eroded(marked: &[bool], width: usize) -> Vec<bool> {
     (0..marked.len()).map(inner).collect()
 }
 
-/// What a picture is to be multiplied by for the least relMSE.
-fn fitted_exposure(image: &Image, reference: &Image, scored: &[bool]) -> f64 {
-    let steady = (FLOOR * reference.mean()).powi(2);
-    let (mut with_reference, mut with_itself) = (0.0, 0.0);
-    let pixels = image.pixels().iter().zip(reference.pixels()).zip(scored);
-    for ((pixel, of_reference), _) in pixels.filter(|(_, is_scored)| **is_scored) {
-        for (&value, &wanted) in pixel.iter().zip(of_reference) {
-            let (value, wanted) = (f64::from(value), f64::from(wanted));
-            let weight = 1.0 / (wanted * wanted + steady);
-            with_reference += weight * value * wanted;
-            with_itself += weight * value * value;
-        }
-    }
-    if with_itself > 0.0 {
-        with_reference / with_itself
-    } else {
-        1.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,7 +263,6 @@ mod tests {
                 relative_mse_trimmed: 0.125,
             },
             version: "3.7".into(),
-            exposure: 0.5,
             energy_ratio: 1.0,
             conditions: Conditions {
                 threads: 2,
@@ -314,22 +275,17 @@ mod tests {
         assert_eq!(from_csv(&text).unwrap(), std::slice::from_ref(&row));
         assert_eq!(crate::score::peers_from_csv(&text).unwrap(), [row.result]);
         assert!(from_csv(&text.replace(",100k", "")).is_err());
-        assert!(from_csv(&text.replace("0.50000", "half")).is_err());
+        assert!(from_csv(&text.replace("1.00000", "all")).is_err());
         assert!(from_csv("peer,scene\n").is_err());
     }
 
     #[test]
     fn lines_of_scripts_are_read_and_others_refused() {
-        let picture = Picture::parse("p 3.7 20k 0.5 fitted a.exr b.exr").unwrap();
-        assert!(picture.is_fitted && picture.seconds == 0.5);
+        let picture = Picture::parse("p 3.7 20k 0.5 a.exr b.exr").unwrap();
+        assert_eq!(picture.seconds, 0.5);
         assert_eq!(picture.other, Path::new("b.exr"));
-        assert!(
-            !Picture::parse("p 3.7 20k 0.5 absolute a b")
-                .unwrap()
-                .is_fitted
-        );
-        assert!(Picture::parse("p 3.7 20k 0.5 fitted a.exr").is_err());
-        assert!(Picture::parse("p 3.7 20k soon fitted a.exr b.exr").is_err());
+        assert!(Picture::parse("p 3.7 20k 0.5 a.exr").is_err());
+        assert!(Picture::parse("p 3.7 20k soon a.exr b.exr").is_err());
     }
 
     #[test]
@@ -341,25 +297,5 @@ mod tests {
             .map(|&it| if it { '#' } else { '.' })
             .collect();
         assert_eq!(found, ["####", "##..", "##..", "##.."].concat());
-    }
-
-    #[test]
-    fn the_exposure_is_found_that_a_picture_was_taken_with() {
-        let wanted: Vec<[f32; 3]> = (0..16i16)
-            .map(|it| [f32::from(it), 2.0, 0.5 * f32::from(it)])
-            .collect();
-        let mut pixels: Vec<_> = wanted
-            .iter()
-            .map(|it| it.map(|value| 4.0 * value))
-            .collect();
-        let mut scored = vec![true; 16];
-        // A pixel that sees the lamp in a mirror.
-        (pixels[3], scored[3]) = ([1e6; 3], false);
-        let image = Image::from_pixels(4, 4, pixels).unwrap();
-        let reference = Image::from_pixels(4, 4, wanted).unwrap();
-        let found = fitted_exposure(&image, &reference, &scored);
-        assert!((found - 0.25).abs() < 1e-6, "{found}");
-        let black = Image::new(4, 4).unwrap();
-        assert_eq!(fitted_exposure(&black, &reference, &scored), 1.0);
     }
 }

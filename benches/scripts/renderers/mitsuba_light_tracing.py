@@ -3,8 +3,8 @@
 
     python3 mitsuba_light_tracing.py SCENE.glb FOLDER WIDTH HEIGHT
 
-For each picture it prints a line: renderer, version, setting, seconds, `absolute`, the file of the picture,
-and the file of what is to be taken off it. Seconds are those of the rendering alone, after a picture of one
+For each picture it prints a line: renderer, version, setting, seconds, the file of the picture, and the file
+of what is to be taken off it. Seconds are those of the rendering alone, after a picture of one
 sample has compiled it.
 
 Mitsuba's picture has all light. What surfaces get directly from the lamp is a second picture by the
@@ -138,7 +138,7 @@ def main():
             for kind, image in (("picture", picture), ("direct", other)):
                 files.append(os.path.join(folder, f"{name}-{samples}-{kind}.exr"))
                 mi.Bitmap(np.ascontiguousarray(image / DIMMED, np.float32)).write(files[-1])
-            print(name, mi.__version__, f"{samples}spp", f"{seconds:.4f}", "absolute", *files, flush=True)
+            print(name, mi.__version__, f"{samples}spp", f"{seconds:.4f}", *files, flush=True)
 
 
 main()

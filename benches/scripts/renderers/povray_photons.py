@@ -3,14 +3,14 @@
 
     python3 povray_photons.py SCENE.glb FOLDER WIDTH HEIGHT
 
-For each picture it prints a line: renderer, version, setting, seconds, `fitted`, the file of the picture,
-and the file of what is to be taken off it. Seconds are those that POV-Ray says it took to shoot photons and to
+For each picture it prints a line: renderer, version, setting, seconds, the file of the picture, and the file
+of what is to be taken off it. Seconds are those that POV-Ray says it took to shoot photons and to
 render, not to read the scene.
 
 POV-Ray's picture has direct light, too, and what glass and mirrors show. The direct light is that of a
 second picture, which is not timed, without photons and with casters that are black and cast whole
-shadows; casters' own pixels are not scored. Its pictures have no absolute units, so that their exposure is
-to be fitted. All but the number of photons is as POV-Ray has it by default, but for paths of up to 20
+shadows; casters' own pixels are not scored. The lamp's colour is its intensity over pi, so that pictures are in
+W/(sr m^2). All but the number of photons is as POV-Ray has it by default, but for paths of up to 20
 surfaces. `wide` lets it look for photons eight times as far as it finds fit, and for 50 to 100 of them:
 by default it finds none between those of a lamp that are far apart, where it draws stripes of dark. Needs
 numpy and povray.
@@ -140,7 +140,7 @@ def main():
             taken = seconds(report)
             setting = f"{photons // 1000}k"
             files = (picture, direct)
-            print(name, version, setting, f"{taken:.3f}", "fitted", *files, flush=True)
+            print(name, version, setting, f"{taken:.3f}", *files, flush=True)
             if taken > PATIENCE:
                 break
 

@@ -285,14 +285,24 @@ fn peer_table(rows: &[Row], peers: &[PeerRow], metric: Metric) -> String {
     text
 }
 
-/// Per scene the peer against which the ratio is least.
+/// Per scene the peer against which the ratio is least, and the one whose error is.
 fn strongest_peers(rows: &[Row], peers: &[PeerRow]) -> String {
     let mut text = String::from(
-        "| scene | least ratio, relMSE | against | least ratio, trimmed | against |\n\
-         | --- | ---: | --- | ---: | --- |\n",
+        "| scene | least relMSE | of | ratio | least ratio, relMSE | against | least ratio, trimmed | against |\n\
+         | --- | ---: | --- | ---: | ---: | --- | ---: | --- |\n",
     );
     let scenes: BTreeSet<&str> = peers.iter().map(|row| row.scene.as_str()).collect();
+    let ratio_of = |race: &Race<'_>| {
+        let ratio = race.ratio();
+        ratio.map_or_else(|| "not reached".to_owned(), figure)
+    };
     for scene in scenes {
+        let by_error = races(rows, peers, Metric::RelativeMse);
+        let of_scene = by_error.iter().filter(|race| race.peer.scene == scene);
+        let error = |race: &Race<'_>| race.peer.relative_mse;
+        let Some(best) = of_scene.min_by(|a, b| error(a).total_cmp(&error(b))) else {
+            continue;
+        };
         let strongest = |metric: Metric| {
             let races = races(rows, peers, metric);
             let of_scene = races.iter().filter(|race| race.peer.scene == scene);
@@ -304,17 +314,15 @@ fn strongest_peers(rows: &[Row], peers: &[PeerRow]) -> String {
             });
             worst.map_or_else(
                 || "– | –".to_owned(),
-                |race| {
-                    let ratio = race
-                        .ratio()
-                        .map_or_else(|| "not reached".to_owned(), figure);
-                    format!("{ratio} | {}", race.peer.peer)
-                },
+                |race| format!("{} | {}", ratio_of(race), race.peer.peer),
             )
         };
         let _ = writeln!(
             text,
-            "| {scene} | {} | {} |",
+            "| {scene} | {} | {} | {} | {} | {} |",
+            figure(error(best)),
+            best.peer.peer,
+            ratio_of(best),
             strongest(Metric::RelativeMse),
             strongest(Metric::Trimmed),
         );
