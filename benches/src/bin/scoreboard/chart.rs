@@ -252,7 +252,7 @@ fn polyline(svg: &mut String, points: &[[f64; 2]], color: &str, width: f64) {
 
 /// The mark of a renderer, by its number.
 fn marker(svg: &mut String, [x, y]: [f64; 2], number: usize) {
-    let outline = match number % 9 {
+    let outline = match number % 10 {
         0 => "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z",
         1 => "M-3.5 -3.5h7v7h-7z",
         2 => "M0 -4.5L4.5 3.5H-4.5z",
@@ -261,6 +261,7 @@ fn marker(svg: &mut String, [x, y]: [f64; 2], number: usize) {
         5 => "M-4 -4L4 4M-4 4L4 -4",
         6 => "M-5 0H5M0 -5V5",
         7 => "M-4.5 0L3.5 -4.5V4.5z",
+        8 => "M4.5 0L-3.5 -4.5V4.5z",
         _ => "M-4 -4L4 4M-4 4L4 -4M-5 0H5M0 -5V5",
     };
     let _ = writeln!(
