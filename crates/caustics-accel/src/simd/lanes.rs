@@ -55,22 +55,16 @@ pub(crate) fn next_lane(bits: &mut u32) -> usize {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Portable;
 
+/// A value for each lane. Not by a loop: kernels are hundreds of these operations in one function, and
+/// compilers take time in proportion to the square of the loops of a function.
 #[inline(always)]
-fn zip(a: Row, b: Row, f: impl Fn(f32, f32) -> f32) -> Row {
-    let mut out = [0.0; WIDTH];
-    for lane in 0..WIDTH {
-        out[lane] = f(a[lane], b[lane]);
-    }
-    out
+fn each<T>(of: impl Fn(usize) -> T) -> [T; WIDTH] {
+    [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
 }
 
 #[inline(always)]
-fn compare(a: Row, b: Row, f: impl Fn(f32, f32) -> bool) -> [u32; WIDTH] {
-    let mut out = [0; WIDTH];
-    for lane in 0..WIDTH {
-        out[lane] = if f(a[lane], b[lane]) { u32::MAX } else { 0 };
-    }
-    out
+fn mask(of: impl Fn(usize) -> bool) -> [u32; WIDTH] {
+    each(|lane| if of(lane) { u32::MAX } else { 0 })
 }
 
 impl Lanes for Portable {
@@ -94,78 +88,63 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn add(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| a + b)
+        each(|lane| a[lane] + b[lane])
     }
 
     #[inline(always)]
     fn sub(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| a - b)
+        each(|lane| a[lane] - b[lane])
     }
 
     #[inline(always)]
     fn mul(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| a * b)
+        each(|lane| a[lane] * b[lane])
     }
 
     #[inline(always)]
     fn div(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| a / b)
+        each(|lane| a[lane] / b[lane])
     }
 
     #[inline(always)]
     fn min(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| if a < b { a } else { b })
+        each(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
     }
 
     #[inline(always)]
     fn max(self, a: Row, b: Row) -> Row {
-        zip(a, b, |a, b| if a > b { a } else { b })
+        each(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
     }
 
     #[inline(always)]
     fn less(self, a: Row, b: Row) -> [u32; WIDTH] {
-        compare(a, b, |a, b| a < b)
+        mask(|lane| a[lane] < b[lane])
     }
 
     #[inline(always)]
     fn at_most(self, a: Row, b: Row) -> [u32; WIDTH] {
-        compare(a, b, |a, b| a <= b)
+        mask(|lane| a[lane] <= b[lane])
     }
 
     #[inline(always)]
-    fn and(self, mut a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
-        for (a, b) in a.iter_mut().zip(b) {
-            *a &= b;
-        }
-        a
+    fn and(self, a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
+        each(|lane| a[lane] & b[lane])
     }
 
     #[inline(always)]
-    fn or(self, mut a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
-        for (a, b) in a.iter_mut().zip(b) {
-            *a |= b;
-        }
-        a
+    fn or(self, a: [u32; WIDTH], b: [u32; WIDTH]) -> [u32; WIDTH] {
+        each(|lane| a[lane] | b[lane])
     }
 
     #[inline(always)]
     fn select(self, mask: [u32; WIDTH], yes: Row, no: Row) -> Row {
-        let mut out = no;
-        for lane in 0..WIDTH {
-            if mask[lane] != 0 {
-                out[lane] = yes[lane];
-            }
-        }
-        out
+        each(|lane| if mask[lane] != 0 { yes[lane] } else { no[lane] })
     }
 
     #[inline(always)]
     fn bits(self, mask: [u32; WIDTH]) -> u32 {
-        let mut bits = 0;
-        for (lane, yes) in mask.into_iter().enumerate() {
-            bits |= yes & (1 << lane);
-        }
-        bits
+        let bits = each(|lane| mask[lane] & (1 << lane));
+        (bits[0] | bits[1]) | (bits[2] | bits[3]) | ((bits[4] | bits[5]) | (bits[6] | bits[7]))
     }
 
     #[inline(always)]
