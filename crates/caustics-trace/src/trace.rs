@@ -1,4 +1,4 @@
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use caustics_accel::Intersect;
 use caustics_sampling::CounterRng;
@@ -17,12 +17,18 @@ use crate::traced::Traced;
 use crate::tracer::PathTracer;
 use crate::wave::{WAVE, Wave};
 
-/// Photons that one task traces: enough to share out, few enough to balance.
-const CHUNK: u32 = 2048;
+/// Photons that one task traces, and points whose photons one task divides at edges: few enough to balance,
+/// enough that what a task begins with costs little. As many for any number of threads, so that what comes of
+/// it is the same.
+const CHUNK: RangeInclusive<u32> = 256..=2048;
 
-/// Points whose photons one task divides at edges. More, since each task finds the ways of all paths
-/// that end there anew.
-const EDGE_CHUNK: u32 = 8192;
+/// So many tasks are balanced.
+const TASKS: u32 = 64;
+
+/// What one task does of so many.
+fn chunk(all: u32) -> u32 {
+    (all / TASKS).clamp(*CHUNK.start(), *CHUNK.end())
+}
 
 /// Traces photons from all lights of `world` and returns those that landed after at least one
 /// specular event, with the ledger of where all the energy went.
@@ -198,10 +204,11 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         photons: Range<u32>,
         progress: &(dyn Fn(u32) + Sync),
     ) -> Traced {
-        let chunks = (photons.len() as u32).div_ceil(CHUNK);
+        let size = chunk(photons.len() as u32);
+        let chunks = (photons.len() as u32).div_ceil(size);
         let run = |chunk: u32| {
-            let start = photons.start + chunk * CHUNK;
-            let range = start..photons.end.min(start.saturating_add(CHUNK));
+            let start = photons.start + chunk * size;
+            let range = start..photons.end.min(start.saturating_add(size));
             let finished = range.len() as u32;
             let traced = self.trace_range::<N>(range);
             progress(finished);
@@ -253,11 +260,12 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         if !self.options.divide_edges || self.options.branching != Branching::SplitAll {
             return traced.checked(lattice, points);
         }
-        let chunks = (points.len() as u32).div_ceil(EDGE_CHUNK);
+        let size = chunk(points.len() as u32);
+        let chunks = (points.len() as u32).div_ceil(size);
         let parts: Vec<(Vec<Photon>, EnergyLedger)> = traced.with_neighbours(lattice, |photons| {
             let check = |chunk: u32| {
-                let start = points.start + chunk * EDGE_CHUNK;
-                let end = points.end.min(start.saturating_add(EDGE_CHUNK));
+                let start = points.start + chunk * size;
+                let end = points.end.min(start.saturating_add(size));
                 EdgeTracer::new(self).checked(photons, start..end)
             };
             #[cfg(feature = "parallel")]
