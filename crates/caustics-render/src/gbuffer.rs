@@ -4,6 +4,7 @@ use caustics_scene::{Brdf, Camera, World};
 use glam::Vec3;
 
 use crate::error::RenderError;
+use crate::in_order;
 use crate::picture::PictureOptions;
 use crate::pixel_samples::PixelSamples;
 use crate::screen::Screen;
@@ -73,9 +74,9 @@ impl GBuffer {
             width,
             height,
         };
-        let rows = in_rows(height, |y| looker.row(y));
+        let rows = in_order::made(height, |y| looker.row(y));
         let centers: Vec<Option<Texel>> = rows.into_iter().flatten().collect();
-        let refined = in_rows(height, |y| looker.refine_row(y, &centers));
+        let refined = in_order::made(height, |y| looker.refine_row(y, &centers));
 
         let mut buffer = Self {
             screen: Screen::new(camera, width, height),
@@ -126,17 +127,6 @@ impl GBuffer {
     pub fn rays(&self) -> u64 {
         self.rays
     }
-}
-
-/// Computes rows of a picture, in parallel where the feature allows, in their order.
-pub(crate) fn in_rows<T: Send>(height: u32, row: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        (0..height).into_par_iter().map(row).collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    (0..height).map(row).collect()
 }
 
 struct Looker<'a, I: ?Sized> {

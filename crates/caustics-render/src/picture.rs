@@ -11,6 +11,7 @@ use crate::eye::{EyeTracer, Receiver};
 use crate::footprint::FootprintOptions;
 use crate::footprint_gather::FootprintGather;
 use crate::gbuffer::GBuffer;
+use crate::in_order;
 use crate::nearest::NearestEstimate;
 use crate::pixel::PixelSamples;
 use crate::splat::splat;
@@ -188,13 +189,7 @@ pub fn render<I: Intersect + ?Sized>(
         progress(1);
         finished
     };
-    #[cfg(feature = "parallel")]
-    let rows: Vec<Row> = {
-        use rayon::prelude::*;
-        (0..options.height).into_par_iter().map(finish).collect()
-    };
-    #[cfg(not(feature = "parallel"))]
-    let rows: Vec<Row> = (0..options.height).map(finish).collect();
+    let rows: Vec<Row> = in_order::made(options.height, finish);
 
     let mut picture = Picture {
         direct: Image::new(options.width, options.height)?,

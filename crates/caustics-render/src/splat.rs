@@ -4,6 +4,7 @@ use caustics_trace::Photon;
 use crate::error::RenderError;
 use crate::footprint::FootprintOptions;
 use crate::gbuffer::GBuffer;
+use crate::in_order;
 use crate::prepared_splat::{LEVELS, Prepared, Splat};
 use crate::screen::Screen;
 use crate::splat_level::Level;
@@ -43,11 +44,14 @@ pub fn splat(
     options: &FootprintOptions,
 ) -> Result<(Image, SplatStats), RenderError> {
     options.validate()?;
-    let mut passes = vec![Pass::new(Level::finest(buffer, false))];
-    if buffer.is_glossy() {
-        passes.push(Pass::new(Level::finest(buffer, true)));
-    }
-    let surroundings = Surroundings::of(buffer);
+    let passes = || {
+        let mut passes = vec![Pass::new(Level::finest(buffer, false))];
+        if buffer.is_glossy() {
+            passes.push(Pass::new(Level::finest(buffer, true)));
+        }
+        passes
+    };
+    let (mut passes, surroundings) = in_order::both(passes, || Surroundings::of(buffer));
     let kernels = Kernels::of(options);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
@@ -107,9 +111,10 @@ impl<'a> Pass<'a> {
         } else {
             prepared
         };
-        for (number, level) in self.levels.iter_mut().enumerate() {
+        let levels = self.levels.iter_mut().enumerate().collect();
+        in_order::each(levels, |(number, level)| {
             level.accumulate(prepared, surroundings, number);
-        }
+        });
     }
 
     fn add_to(mut self, image: &mut Image) {

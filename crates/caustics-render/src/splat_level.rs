@@ -1,17 +1,15 @@
 use std::f32::consts::FRAC_1_PI;
 
 use caustics_filter::Image;
-use glam::{Vec2, Vec3};
-use std::ops::Range;
+use glam::{IVec2, Vec2, Vec3};
 
-use crate::columns::{Columns, ColumnsMut, TexelColumns};
-use crate::footprint_integral::FootprintIntegral;
+use crate::columns::{Columns, TexelColumns};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
-use crate::pixel_samples::PixelSamples;
-use crate::prepared_splat::{Prepared, STRIDE, Splat};
-use crate::screen::Screen;
-use crate::surroundings::{Relation, Surroundings, TILE};
+use crate::in_order;
+use crate::prepared_splat::{Prepared, STRIDE};
+use crate::splat_band::BandTask;
+use crate::surroundings::Surroundings;
 
 /// Rows of one task.
 const BAND: usize = 16;
@@ -25,7 +23,7 @@ pub(crate) fn margin(depth: u32) -> usize {
 }
 
 /// What a level's texels are lit as.
-enum Reflection {
+pub(crate) enum Reflection {
     /// Lambertian ones take irradiance; the picture makes radiance of it in the end.
     Lambertian,
     /// Glossy ones take radiance towards the eye.
@@ -119,23 +117,18 @@ impl<'a> Level<'a> {
     pub(crate) fn coarser(&self) -> Self {
         let stride = STRIDE as usize;
         let size @ [width, height] = self.inner().map(|size| size.div_ceil(stride));
-        let blocks: Vec<Option<Texel>> = (0..width * height)
-            .map(|index| self.block(index % width, index / width))
-            .collect();
+        let blocks = by_pixel([width, height], |x, y| self.block(x, y));
         let (depth, padded) = (self.depth + 1, size.map(|size| size + 2 * MARGIN));
-        let texels = (0..padded[0] * padded[1])
-            .map(|index| {
-                let (x, y) = (index % padded[0], index / padded[0]);
-                let nearest = |at: usize, size: usize| at.clamp(MARGIN, size) - MARGIN;
-                let inside = (nearest(x, width), nearest(y, height));
-                let texel = blocks[inside.1 * width + inside.0]?;
-                if (inside.0 + MARGIN, inside.1 + MARGIN) == (x, y) {
-                    return Some(texel);
-                }
-                let middle = Vec2::new(x as f32, y as f32) + 0.5 - MARGIN as f32;
-                self.moved(texel, middle, depth)
-            })
-            .collect();
+        let texels = by_pixel(padded, |x, y| {
+            let nearest = |at: usize, size: usize| at.clamp(MARGIN, size) - MARGIN;
+            let inside = (nearest(x, width), nearest(y, height));
+            let texel = blocks[inside.1 * width + inside.0]?;
+            if (inside.0 + MARGIN, inside.1 + MARGIN) == (x, y) {
+                return Some(texel);
+            }
+            let middle = Vec2::new(x as f32, y as f32) + 0.5 - MARGIN as f32;
+            self.moved(texel, middle, depth)
+        });
         let is_glossy = matches!(self.reflection, Reflection::Glossy(_));
         Self::new(self.buffer, padded, depth, texels, Vec::new(), is_glossy)
     }
@@ -232,36 +225,33 @@ impl<'a> Level<'a> {
                 splats: &lists[number],
             });
         }
-        #[cfg(feature = "parallel")]
-        {
-            use rayon::prelude::*;
-            tasks
-                .into_par_iter()
-                .with_max_len(1)
-                .for_each(|task| task.run(prepared));
-        }
-        #[cfg(not(feature = "parallel"))]
-        for task in tasks {
-            task.run(prepared);
-        }
+        in_order::each(tasks, |task| task.run(prepared));
     }
 
     pub(crate) fn add_coarser(&mut self, coarse: &Self) {
+        if coarse.is_dark() {
+            return;
+        }
         let stride = STRIDE as f32;
         let (width, margin) = (self.width, self.margin() as f32);
         let place = |pixel: usize| {
             let (x, y) = (pixel % width, pixel / width);
             (Vec2::new(x as f32, y as f32) + 0.5 - margin) / stride - 0.5 + MARGIN as f32
         };
-        if coarse.is_dark() {
-            return;
-        }
-        for (pixel, texel) in self.texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                let sum = self.light.get(pixel) + coarse.interpolate(place(pixel), texel);
-                self.light.set(pixel, sum);
+        let pixels = BAND * width;
+        let bands = self
+            .light
+            .chunks_mut(pixels)
+            .zip(self.texels.chunks(pixels));
+        let bands = bands.enumerate().collect();
+        in_order::each(bands, |(number, (mut light, texels))| {
+            for (offset, texel) in texels.iter().enumerate() {
+                if let Some(texel) = texel {
+                    let at = place(number * pixels + offset);
+                    light.add(offset, coarse.interpolate(at, texel));
+                }
             }
-        }
+        });
         for ((pixel, texel), light) in self.extras.iter().zip(&mut self.extra_light) {
             *light += coarse.interpolate(place(*pixel as usize), texel);
         }
@@ -276,27 +266,29 @@ impl<'a> Level<'a> {
             .all(|&it| it == 0.0)
     }
 
-    /// The light between the middles of pixels, from those that see the same surface.
+    /// The light between the middles of pixels, from those that see the same surface. Both coordinates are at
+    /// least 0.
     fn interpolate(&self, at: Vec2, texel: &Texel) -> Vec3 {
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        let base = at.as_ivec2();
+        let within = IVec2::new(self.width as i32, self.height as i32);
         // The four around the point; where none sees the surface, the next ones out.
         for (first, last) in [(0, 1), (-1, 2)] {
-            let base = at.floor();
             for dy in first..=last {
                 for dx in first..=last {
-                    let corner = base + Vec2::new(dx as f32, dy as f32);
-                    let (x, y) = (corner.x as isize, corner.y as isize);
-                    if x < 0 || y < 0 || x >= self.width as isize || y >= self.height as isize {
+                    let corner = base + IVec2::new(dx, dy);
+                    if corner.cmplt(IVec2::ZERO).any() || corner.cmpge(within).any() {
                         continue;
                     }
-                    let index = y as usize * self.width + x as usize;
+                    let index = corner.y as usize * self.width + corner.x as usize;
                     let Some(other) = &self.texels[index] else {
                         continue;
                     };
                     if !texel.is_like(other) {
                         continue;
                     }
-                    let tent = (1.0 - (at - corner).abs() / (last as f32)).max(Vec2::splat(1e-3));
+                    let off = (at - corner.as_vec2()).abs();
+                    let tent = (1.0 - off / last as f32).max(Vec2::splat(1e-3));
                     let weight = tent.x * tent.y;
                     sum += weight * self.light.get(index);
                     weights += weight;
@@ -333,205 +325,13 @@ impl<'a> Level<'a> {
     }
 }
 
-/// A band of rows and the splats that overlap it.
-struct BandTask<'a> {
-    first_row: usize,
-    width: usize,
-    depth: u32,
-    surroundings: &'a Surroundings,
-    screen: &'a Screen,
-    reflection: &'a Reflection,
-    texels: &'a [Option<Texel>],
-    columns: &'a TexelColumns,
-    /// From the band's first row on.
-    light: ColumnsMut<'a>,
-    first_extra: usize,
-    extras: &'a [(u32, Texel)],
-    extra_light: &'a mut [Vec3],
-    splats: &'a [u32],
-}
-
-impl BandTask<'_> {
-    fn run(mut self, prepared: &[Prepared]) {
-        let rows = self.light.x.len() / self.width;
-        let mut weights = [Vec::new(), Vec::new()];
-        for &index in self.splats {
-            let Prepared::Splat(splat) = &prepared[index as usize] else {
-                continue;
-            };
-            let first = usize::from(splat.rows[0]).max(self.first_row);
-            let last = usize::from(splat.rows[1]).min(self.first_row + rows);
-            if let Some(integral) = &splat.integral {
-                self.light_integrated(splat, integral, first..last, &mut weights);
-                continue;
-            }
-            if splat.is_plain {
-                for row in first..last {
-                    self.light(splat, row, splat.span(row), Relation::Flat);
-                }
-            } else {
-                self.light_by_tiles(splat, first..last);
-            }
-            if !self.extras.is_empty() && first < last {
-                let low = (first * self.width) as u32;
-                let high = (last * self.width) as u32;
-                let begin = self.extras.partition_point(|&(pixel, _)| pixel < low);
-                let columns = splat.columns.map(u32::from);
-                for (offset, (pixel, texel)) in self.extras[begin..].iter().enumerate() {
-                    if *pixel >= high {
-                        break;
-                    }
-                    let column = pixel % self.width as u32;
-                    if (columns[0]..columns[1]).contains(&column) {
-                        self.extra_light[begin + offset] +=
-                            self.extra(splat, begin + offset, texel);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Lights the pixels of some rows by a footprint that is integrated over each.
-    fn light_integrated(
-        &mut self,
-        splat: &Splat,
-        integral: &FootprintIntegral,
-        rows: Range<usize>,
-        [weights, part_weights]: &mut [Vec<f32>; 2],
-    ) {
-        let columns = usize::from(splat.columns[0])..usize::from(splat.columns[1]);
-        if rows.is_empty() || columns.is_empty() {
-            return;
-        }
-        let (texels, light) = (self.texels, &mut self.light);
-        let (width, first) = (self.width, self.first_row);
-        let (density, gate) = (&splat.density, &splat.gate);
-        let gaussian = integral.gaussian();
-        gaussian.light_pixels(&columns, &rows, weights, |column, row, weight| {
-            if let Some(texel) = &texels[row * width + column]
-                && integral.is_in_plane(density, gate, texel)
-            {
-                let target = (row - first) * width + column;
-                let weight = if texel.samples == PixelSamples::ALL {
-                    weight
-                } else {
-                    gaussian.part(column, row, texel.samples, part_weights) / texel.coverage
-                };
-                let irradiance = integral.irradiance_in_plane(density, gate, texel, weight);
-                light.add(target, irradiance);
-            }
-        });
-        let mut at = |texel: &Texel, pixel: [usize; 2]| {
-            integral.irradiance(density, gate, texel, pixel, self.screen, weights)
-        };
-        // Off the plane each pixel lies elsewhere in the distribution.
-        let off_plane = if integral.is_flat() {
-            0..0
-        } else {
-            rows.clone()
-        };
-        for row in off_plane {
-            for column in columns.clone() {
-                if let Some(texel) = &texels[row * width + column]
-                    && !integral.is_in_plane(density, gate, texel)
-                {
-                    let target = (row - first) * width + column;
-                    light.add(target, at(texel, [column, row]));
-                }
-            }
-        }
-        let begin = |row: usize| {
-            self.extras
-                .partition_point(|&(pixel, _)| (pixel as usize) < row * self.width)
-        };
-        for index in begin(rows.start)..begin(rows.end) {
-            let (pixel, texel) = &self.extras[index];
-            let (row, column) = (*pixel as usize / self.width, *pixel as usize % self.width);
-            if columns.contains(&column) {
-                self.extra_light[index] += at(texel, [column, row]);
-            }
-        }
-    }
-
-    /// Lights rows of the band tile by tile, each by what it is to the splat.
-    fn light_by_tiles(&mut self, splat: &Splat, rows: Range<usize>) {
-        let margin = margin(self.depth);
-        let tile_of = |pixel: usize| pixel.saturating_sub(margin) / TILE;
-        let [first, last] = splat.columns.map(usize::from);
-        if first >= last {
-            return;
-        }
-        // Columns where something of the same kind begins and ends.
-        let mut runs: Vec<(Range<usize>, Relation)> = Vec::new();
-        let mut tile_row = usize::MAX;
-        for row in rows {
-            if tile_of(row) != tile_row {
-                tile_row = tile_of(row);
-                runs.clear();
-                for column in tile_of(first)..=tile_of(last - 1) {
-                    let place = [column, tile_row];
-                    let relation = self.surroundings.relation(
-                        self.depth,
-                        place,
-                        &splat.density,
-                        &splat.gate,
-                        splat.flat,
-                    );
-                    let end = ((column + 1) * TILE + margin).min(last);
-                    match runs.last_mut() {
-                        Some((run, known)) if *known == relation => run.end = end,
-                        Some((run, _)) => {
-                            let begin = run.end;
-                            runs.push((begin..end, relation));
-                        }
-                        None => runs.push((first..end, relation)),
-                    }
-                }
-                // The margin belongs to the last tile.
-                if let Some((run, _)) = runs.last_mut() {
-                    run.end = last;
-                }
-            }
-            for (run, relation) in &runs {
-                let columns = match relation {
-                    Relation::Dark => continue,
-                    Relation::Flat => {
-                        let span = splat.span(row);
-                        span.start.max(run.start)..span.end.min(run.end)
-                    }
-                    Relation::Own | Relation::Mixed => run.clone(),
-                };
-                self.light(splat, row, columns, *relation);
-            }
-        }
-    }
-
-    /// Lights some columns of a row.
-    fn light(&mut self, splat: &Splat, row: usize, columns: Range<usize>, relation: Relation) {
-        if columns.is_empty() {
-            return;
-        }
-        let count = columns.len();
-        let from = row * self.width + columns.start;
-        let to = (row - self.first_row) * self.width + columns.start;
-        let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
-        match self.reflection {
-            Reflection::Lambertian => {
-                let is_mixed = relation == Relation::Mixed;
-                self.columns
-                    .light(density, gate, is_mixed, from, count, light, to);
-            }
-            Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
-        }
-    }
-
-    /// What a splat adds to an extra texel of the band.
-    fn extra(&self, splat: &Splat, extra: usize, texel: &Texel) -> Vec3 {
-        match self.reflection {
-            Reflection::Lambertian => splat.irradiance(texel),
-            Reflection::Glossy(texels) => {
-                texels.extra_radiance(self.first_extra + extra, &splat.density, &splat.gate)
-            }
-        }
-    }
+/// Something for each pixel of a picture, row by row.
+fn by_pixel<T: Send>(
+    [width, height]: [usize; 2],
+    of: impl Fn(usize, usize) -> T + Sync + Send,
+) -> Vec<T> {
+    let rows = in_order::made(height as u32, |y| -> Vec<T> {
+        (0..width).map(|x| of(x, y as usize)).collect()
+    });
+    rows.into_iter().flatten().collect()
 }

@@ -1,0 +1,36 @@
+//! Work on all threads where the feature allows, whose results do not depend on how many there are.
+
+/// What is made of each of so many numbers, in their order: rows of a picture, mostly.
+pub(crate) fn made<T: Send>(count: u32, make: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().map(make).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    (0..count).map(make).collect()
+}
+
+/// Does each of some tasks, which are large.
+pub(crate) fn each<T: Send>(tasks: Vec<T>, run: impl Fn(T) + Sync + Send) {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        tasks.into_par_iter().with_max_len(1).for_each(run);
+    }
+    #[cfg(not(feature = "parallel"))]
+    tasks.into_iter().for_each(run);
+}
+
+/// What two tasks make.
+pub(crate) fn both<A: Send, B: Send>(
+    one: impl FnOnce() -> A + Send,
+    other: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    #[cfg(feature = "parallel")]
+    {
+        rayon::join(one, other)
+    }
+    #[cfg(not(feature = "parallel"))]
+    (one(), other())
+}
