@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::f32::consts::FRAC_1_PI;
 
 use caustics_filter::Image;
@@ -39,10 +40,10 @@ pub(crate) struct Level<'a> {
     height: usize,
     /// How often the picture was halved.
     depth: u32,
-    texels: Vec<Option<Texel>>,
+    texels: Cow<'a, [Option<Texel>]>,
     columns: TexelColumns,
     light: Columns,
-    extras: Vec<(u32, Texel)>,
+    extras: Cow<'a, [(u32, Texel)]>,
     extra_light: Vec<Vec3>,
     /// For each band, where its extras start; one more than there are bands.
     extra_starts: Vec<usize>,
@@ -53,8 +54,8 @@ impl<'a> Level<'a> {
         buffer: &'a GBuffer,
         [width, height]: [usize; 2],
         depth: u32,
-        texels: Vec<Option<Texel>>,
-        extras: Vec<(u32, Texel)>,
+        texels: Cow<'a, [Option<Texel>]>,
+        extras: Cow<'a, [(u32, Texel)]>,
         is_glossy: bool,
     ) -> Self {
         let (reflection, columns) = if is_glossy {
@@ -90,11 +91,18 @@ impl<'a> Level<'a> {
             let is_wanted = |texel: &Texel| buffer.brdf(texel).is_lambertian() != is_glossy;
             let (texels, extras) = (buffer.texels.iter(), buffer.extras.iter());
             (
-                texels.map(|texel| texel.filter(is_wanted)).collect(),
-                extras.filter(|(_, it)| is_wanted(it)).copied().collect(),
+                texels
+                    .map(|texel| texel.filter(is_wanted))
+                    .collect::<Vec<_>>()
+                    .into(),
+                extras
+                    .filter(|(_, it)| is_wanted(it))
+                    .copied()
+                    .collect::<Vec<_>>()
+                    .into(),
             )
         } else {
-            (buffer.texels.clone(), buffer.extras.clone())
+            (Cow::from(&buffer.texels), Cow::from(&buffer.extras))
         };
         let size = [buffer.width(), buffer.height()].map(|size| size as usize);
         Self::new(buffer, size, 0, texels, extras, is_glossy)
@@ -130,7 +138,14 @@ impl<'a> Level<'a> {
             self.moved(texel, middle, depth)
         });
         let is_glossy = matches!(self.reflection, Reflection::Glossy(_));
-        Self::new(self.buffer, padded, depth, texels, Vec::new(), is_glossy)
+        Self::new(
+            self.buffer,
+            padded,
+            depth,
+            texels.into(),
+            Cow::default(),
+            is_glossy,
+        )
     }
 
     /// The texel of a block of the next level.
@@ -304,23 +319,26 @@ impl<'a> Level<'a> {
     /// Adds the radiance of all texels to a picture.
     pub(crate) fn add_to(&self, image: &mut Image) {
         let pixels = image.pixels_mut();
-        let mut add = |pixel: usize, texel: &Texel, light: Vec3| {
+        let add = |pixel: &mut [f32; 3], texel: &Texel, light: Vec3| {
             let reflected = match self.reflection {
                 Reflection::Lambertian => {
                     FRAC_1_PI * (self.buffer.brdf(texel).base() * texel.coverage)
                 }
                 Reflection::Glossy(_) => Vec3::splat(texel.coverage),
             };
-            let sum = Vec3::from(pixels[pixel]) + reflected * light;
-            pixels[pixel] = sum.to_array();
+            *pixel = (Vec3::from(*pixel) + reflected * light).to_array();
         };
-        for (index, texel) in self.texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                add(index, texel, self.light.get(index));
+        let band = BAND * self.width;
+        let bands = pixels.chunks_mut(band).zip(self.texels.chunks(band));
+        in_order::each(bands.enumerate().collect(), |(number, (pixels, texels))| {
+            for (index, (pixel, texel)) in (number * band..).zip(pixels.iter_mut().zip(texels)) {
+                if let Some(texel) = texel {
+                    add(pixel, texel, self.light.get(index));
+                }
             }
-        }
+        });
         for ((pixel, texel), light) in self.extras.iter().zip(&self.extra_light) {
-            add(*pixel as usize, texel, *light);
+            add(&mut pixels[*pixel as usize], texel, *light);
         }
     }
 }
