@@ -39,6 +39,9 @@ const LEAST_SEARCHED: f32 = 1.0 / 16.0;
 /// A lattice is kept from one frame to the next while at least this part of its share is used.
 const LEAST_KEPT: f64 = 0.8;
 
+/// Photons that one task sends ahead.
+const PILOTS_OF_TASK: u32 = 32;
+
 /// The photons of one emitter.
 #[derive(Clone, Debug)]
 pub struct EmissionBatch {
@@ -235,11 +238,27 @@ impl EmissionBatch {
         pilots: u32,
     ) -> EnergyLedger {
         let points = PointSet::new(Sequence::Halton, pilots, 0);
-        let mut tracer = self.pilot_tracer::<I, N>(world, intersect, casters, options);
-        for index in 0..pilots {
-            self.send_pilot(&mut tracer, world, &points, index);
+        let some = |first: u32| {
+            let mut tracer = self.pilot_tracer::<I, N>(world, intersect, casters, options);
+            for index in first..pilots.min(first + PILOTS_OF_TASK) {
+                self.send_pilot(&mut tracer, world, &points, index);
+            }
+            tracer.ledger
+        };
+        let tasks = pilots.div_ceil(PILOTS_OF_TASK);
+        let first = |task: u32| task * PILOTS_OF_TASK;
+        #[cfg(feature = "parallel")]
+        let ledgers: Vec<EnergyLedger> = {
+            use rayon::prelude::*;
+            (0..tasks).into_par_iter().map(first).map(some).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let ledgers: Vec<EnergyLedger> = (0..tasks).map(first).map(some).collect();
+        let mut all = EnergyLedger::default();
+        for ledger in &ledgers {
+            all.merge(ledger);
         }
-        tracer.ledger
+        all
     }
 
     /// A tracer of photons that go ahead of the others.

@@ -1,4 +1,4 @@
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use caustics_geometry::{Frame, Sphere};
 use caustics_sampling::warp::{Cone, sphere_octahedral_to_square, square_to_sphere_octahedral};
@@ -27,6 +27,12 @@ const HALVINGS: u32 = 18;
 
 /// Which cells of an emitter's unit square could send photons to its caster.
 ///
+/// Maps that a caster's triangles are drawn into side by side.
+const DRAWINGS: usize = 32;
+
+/// The least triangles for which such a map is made.
+const LEAST_OF_DRAWING: usize = 512;
+
 /// A conservative projection map (Jensen, *Global Illumination using Photon Maps*, 1996, section
 /// 2.1): the caster's triangles and spheres are drawn into the square that directions (by the
 /// [`EmissionDomain`]'s own area-preserving map) or places on a sun's rectangle are made from, and
@@ -46,10 +52,7 @@ impl ProjectionMap {
     /// The map of some objects in an emitter's square; `None` for a light with an area, whose rays
     /// have four parameters.
     pub(crate) fn of(world: &World, objects: &[u32], domain: &EmissionDomain) -> Option<Self> {
-        let mut map = Self {
-            words: vec![0; (RESOLUTION * RESOLUTION / 32) as usize],
-            marked: 0,
-        };
+        let mut map = Self::empty();
         match domain {
             EmissionDomain::Rectangle { corner, edges, .. } => {
                 for (corners, _) in triangles(world, objects) {
@@ -76,6 +79,13 @@ impl ProjectionMap {
         }
         map.marked = map.words.iter().map(|word| word.count_ones()).sum();
         Some(map)
+    }
+
+    fn empty() -> Self {
+        Self {
+            words: vec![0; (RESOLUTION * RESOLUTION / 32) as usize],
+            marked: 0,
+        }
     }
 
     /// The marked part of all cells, in 0..=1.
@@ -199,10 +209,44 @@ impl ProjectionMap {
     }
 
     fn draw_directions(&mut self, world: &World, objects: &[u32], origin: Vec3, cells: &Cells) {
+        let all: Vec<[Vec3; 3]> = triangles(world, objects)
+            .map(|(corners, _)| corners.map(|it| it - origin))
+            .collect();
+        let size = all.len().div_ceil(DRAWINGS).max(LEAST_OF_DRAWING);
+        let draw = |part: &[[Vec3; 3]]| {
+            let mut map = Self::empty();
+            map.draw_far_triangles(part, cells);
+            map
+        };
+        #[cfg(feature = "parallel")]
+        let parts: Vec<Self> = {
+            use rayon::prelude::*;
+            all.par_chunks(size).map(draw).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let parts: Vec<Self> = all.chunks(size).map(draw).collect();
+        for part in parts {
+            for (word, more) in self.words.iter_mut().zip(part.words) {
+                *word |= more;
+            }
+        }
+        for sphere in spheres(world, objects) {
+            let to_center = sphere.center - origin;
+            let distance = to_center.length();
+            if distance <= sphere.radius {
+                return self.words.fill(u32::MAX);
+            }
+            let radius = (sphere.radius / distance).asin();
+            self.draw_cap(&Cap::new(to_center / distance, radius), cells);
+        }
+    }
+
+    /// Marks what triangles cover of the directions from the origin.
+    fn draw_far_triangles(&mut self, triangles: &[[Vec3; 3]], cells: &Cells) {
         let mut pieces = Vec::new();
         let widest = PIECE_RADIUS * cells.radius();
-        for (corners, _) in triangles(world, objects) {
-            pieces.push((corners.map(|it| it - origin), HALVINGS));
+        for &corners in triangles {
+            pieces.push((corners, HALVINGS));
             while let Some((corners, halvings)) = pieces.pop() {
                 match Cap::around(corners) {
                     Some(cap) if cap.radius <= widest => self.draw_small_cap(&cap, cells),
@@ -214,15 +258,6 @@ impl ProjectionMap {
                     }
                 }
             }
-        }
-        for sphere in spheres(world, objects) {
-            let to_center = sphere.center - origin;
-            let distance = to_center.length();
-            if distance <= sphere.radius {
-                return self.words.fill(u32::MAX);
-            }
-            let radius = (sphere.radius / distance).asin();
-            self.draw_cap(&Cap::new(to_center / distance, radius), cells);
         }
     }
 
@@ -351,9 +386,9 @@ impl Cap {
 struct Cells {
     finest: Vec<Cap>,
     /// The levels above, from the coarsest; made when first asked for, by a wide cap.
-    coarser: OnceCell<Vec<Vec<Cap>>>,
+    coarser: OnceLock<Vec<Vec<Cap>>>,
     /// The point of the square for a direction.
-    inverse: Box<dyn Fn(Vec3) -> Vec2>,
+    inverse: Box<dyn Fn(Vec3) -> Vec2 + Sync>,
     /// The least angle, in radians, between the directions of two points of the square, relative to
     /// the points' distance.
     least_stretch: f32,
@@ -370,7 +405,7 @@ impl Cells {
         let across = (0.5 + 0.5 * cone.cosine()).max(0.0).sqrt();
         Self {
             finest: finest(&|at| frame.to_world(cone.sample_concentric(at).value)),
-            coarser: OnceCell::new(),
+            coarser: OnceLock::new(),
             inverse: Box::new(move |direction| cone.invert_concentric(frame.to_local(direction))),
             least_stretch: 2.0 * 0.568 * chord * across,
             wraps: false,
@@ -380,7 +415,7 @@ impl Cells {
     fn of_sphere() -> Self {
         Self {
             finest: finest(&|at| square_to_sphere_octahedral(at).value),
-            coarser: OnceCell::new(),
+            coarser: OnceLock::new(),
             inverse: Box::new(sphere_octahedral_to_square),
             // The whole sphere over the largest singular value, 2 sqrt(3.82) by 2 at the equator.
             least_stretch: 1.6,
