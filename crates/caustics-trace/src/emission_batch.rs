@@ -15,6 +15,7 @@ use crate::lattice::Lattice;
 use crate::ledger::{EnergyLedger, Fate};
 use crate::media::MediumStack;
 use crate::options::{Aim, TraceOptions};
+use crate::parallel;
 use crate::projection_map::ProjectionMap;
 use crate::tracer::PathTracer;
 
@@ -238,22 +239,14 @@ impl EmissionBatch {
         pilots: u32,
     ) -> EnergyLedger {
         let points = PointSet::new(Sequence::Halton, pilots, 0);
-        let some = |first: u32| {
+        let ledgers = parallel::made(pilots.div_ceil(PILOTS_OF_TASK), |task| {
             let mut tracer = self.pilot_tracer::<I, N>(world, intersect, casters, options);
+            let first = task * PILOTS_OF_TASK;
             for index in first..pilots.min(first + PILOTS_OF_TASK) {
                 self.send_pilot(&mut tracer, world, &points, index);
             }
             tracer.ledger
-        };
-        let tasks = pilots.div_ceil(PILOTS_OF_TASK);
-        let first = |task: u32| task * PILOTS_OF_TASK;
-        #[cfg(feature = "parallel")]
-        let ledgers: Vec<EnergyLedger> = {
-            use rayon::prelude::*;
-            (0..tasks).into_par_iter().map(first).map(some).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let ledgers: Vec<EnergyLedger> = (0..tasks).map(first).map(some).collect();
+        });
         let mut all = EnergyLedger::default();
         for ledger in &ledgers {
             all.merge(ledger);
@@ -385,5 +378,54 @@ impl EmissionBatch {
         } else {
             self.fresh_lattice(options)
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use caustics_geometry::shapes::quad;
+    use caustics_scene::{BvhOptions, Instance, Light, Material, Scene, Shape};
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn every_pilot_is_sent_once() -> Result<(), Box<dyn std::error::Error>> {
+        let mut scene = Scene::new();
+        let glass = scene.add_material(Material::dielectric("glass", 1.5))?;
+        let white = scene.add_material(Material::diffuse("white", [0.8; 3]))?;
+        let ball = Shape::Sphere {
+            center: Vec3::Y,
+            radius: 0.5,
+        };
+        scene.add_instance(Instance::new("ball", ball, glass))?;
+        let sides = [[10.0, 0.0, 0.0], [0.0, 0.0, -10.0]];
+        let floor = quad([-5.0, 0.0, 5.0], sides[0], sides[1])?;
+        let floor = Shape::Mesh(scene.add_mesh(floor));
+        scene.add_instance(Instance::new("floor", floor, white))?;
+        scene.add_light(Light::point([0.0, 6.0, 0.0], [10.0; 3])?)?;
+        let world = World::new(&scene)?;
+        let rays = world.intersector(&BvhOptions::default())?;
+
+        let options = TraceOptions::default();
+        let casters = Casters::of(&world);
+        let emitter = Emitter::all(&world, &casters, options.aim).remove(0);
+        let batch = EmissionBatch::new(&world, &rays, emitter, &casters, &options);
+        // More than a whole number of tasks.
+        let pilots = 3 * PILOTS_OF_TASK + 5;
+        let found = batch.pilots::<_, 2>(&world, &rays, &casters, &options, pilots);
+        let points = PointSet::new(Sequence::Halton, pilots, 0);
+        let mut tracer = batch.pilot_tracer::<_, 2>(&world, &rays, &casters, &options);
+        for index in 0..pilots {
+            batch.send_pilot(&mut tracer, &world, &points, index);
+        }
+        for fate in Fate::ALL {
+            let (found, expected) = (found.entry(fate), tracer.ledger.entry(fate));
+            assert_eq!(found.count, expected.count, "{fate:?}");
+            assert!(found.flux.abs_diff_eq(expected.flux, 1e-12), "{fate:?}");
+        }
+        assert_eq!(found.emitted().count, u64::from(pilots));
+        assert!(found.entry(Fate::Stored).count > u64::from(pilots) / 2);
+        Ok(())
     }
 }

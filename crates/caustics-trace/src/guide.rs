@@ -7,6 +7,7 @@ use crate::casters::Casters;
 use crate::domain::EmissionDomain;
 use crate::emission_batch::EmissionBatch;
 use crate::options::TraceOptions;
+use crate::parallel;
 use crate::photon::Photon;
 
 /// One of so many photons may go ahead.
@@ -118,13 +119,7 @@ fn landings<I: Intersect + ?Sized, const N: usize>(
         };
         (row * side..(row + 1) * side).map(of_pilot).collect()
     };
-    #[cfg(feature = "parallel")]
-    let rows: Vec<_> = {
-        use rayon::prelude::*;
-        (0..side).into_par_iter().map(of_row).collect()
-    };
-    #[cfg(not(feature = "parallel"))]
-    let rows: Vec<_> = (0..side).map(of_row).collect();
+    let rows = parallel::made(side, of_row);
     rows.into_iter().flatten().collect()
 }
 

@@ -1,22 +1,10 @@
-use std::sync::OnceLock;
-
-use caustics_geometry::{Frame, Sphere};
-use caustics_sampling::warp::{Cone, sphere_octahedral_to_square, square_to_sphere_octahedral};
+use caustics_geometry::Sphere;
 use caustics_scene::World;
 use glam::{Vec2, Vec3};
 
+use crate::direction_cells::{Cap, Cells, LEVELS, RESOLUTION};
 use crate::domain::EmissionDomain;
-
-/// Cells along each side of a map, a power of two. A caster's outline is known to about one of
-/// them: at 128, a round one that fills its cone is seen 3 % wider than it is.
-const RESOLUTION: u32 = 128;
-
-/// Levels of the tree of cells above the finest.
-const LEVELS: u32 = RESOLUTION.ilog2();
-
-/// By how much the circle around a cell of directions is wider than the one through its corners:
-/// its sides are curved.
-const CELL_MARGIN: f32 = 1.15;
+use crate::parallel;
 
 /// The largest radius of a piece of a surface, as the light sees it, that is looked at as a whole, in
 /// radii of a cell: wider ones are halved until they fit.
@@ -25,14 +13,14 @@ const PIECE_RADIUS: f32 = 0.7;
 /// How often a triangle is halved at most, before everything that its pieces might cover is marked.
 const HALVINGS: u32 = 18;
 
-/// Which cells of an emitter's unit square could send photons to its caster.
-///
 /// Maps that a caster's triangles are drawn into side by side.
 const DRAWINGS: usize = 32;
 
 /// The least triangles for which such a map is made.
 const LEAST_OF_DRAWING: usize = 512;
 
+/// Which cells of an emitter's unit square could send photons to its caster.
+///
 /// A conservative projection map (Jensen, *Global Illumination using Photon Maps*, 1996, section
 /// 2.1): the caster's triangles and spheres are drawn into the square that directions (by the
 /// [`EmissionDomain`]'s own area-preserving map) or places on a sun's rectangle are made from, and
@@ -55,7 +43,7 @@ impl ProjectionMap {
         let mut map = Self::empty();
         match domain {
             EmissionDomain::Rectangle { corner, edges, .. } => {
-                for (corners, _) in triangles(world, objects) {
+                for corners in triangles(world, objects) {
                     map.draw_triangle(corners.map(|it| on_rectangle(it, *corner, edges)));
                 }
                 for sphere in spheres(world, objects) {
@@ -210,23 +198,17 @@ impl ProjectionMap {
 
     fn draw_directions(&mut self, world: &World, objects: &[u32], origin: Vec3, cells: &Cells) {
         let all: Vec<[Vec3; 3]> = triangles(world, objects)
-            .map(|(corners, _)| corners.map(|it| it - origin))
+            .map(|corners| corners.map(|it| it - origin))
             .collect();
         let size = all.len().div_ceil(DRAWINGS).max(LEAST_OF_DRAWING);
-        let draw = |part: &[[Vec3; 3]]| {
+        let parts: Vec<_> = all.chunks(size).collect();
+        let maps = parallel::made(parts.len() as u32, |number| {
             let mut map = Self::empty();
-            map.draw_far_triangles(part, cells);
+            map.draw_directions_to(parts[number as usize], cells);
             map
-        };
-        #[cfg(feature = "parallel")]
-        let parts: Vec<Self> = {
-            use rayon::prelude::*;
-            all.par_chunks(size).map(draw).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let parts: Vec<Self> = all.chunks(size).map(draw).collect();
-        for part in parts {
-            for (word, more) in self.words.iter_mut().zip(part.words) {
+        });
+        for map in maps {
+            for (word, more) in self.words.iter_mut().zip(map.words) {
                 *word |= more;
             }
         }
@@ -241,8 +223,8 @@ impl ProjectionMap {
         }
     }
 
-    /// Marks what triangles cover of the directions from the origin.
-    fn draw_far_triangles(&mut self, triangles: &[[Vec3; 3]], cells: &Cells) {
+    /// Marks the directions from the light to triangles, whose corners are given from there.
+    fn draw_directions_to(&mut self, triangles: &[[Vec3; 3]], cells: &Cells) {
         let mut pieces = Vec::new();
         let widest = PIECE_RADIUS * cells.radius();
         for &corners in triangles {
@@ -312,16 +294,13 @@ fn on_rectangle(point: Vec3, corner: Vec3, edges: &[Vec3; 2]) -> Vec2 {
     Vec2::new(along(edges[0]), along(edges[1]))
 }
 
-fn triangles<'a>(
-    world: &'a World,
-    objects: &'a [u32],
-) -> impl Iterator<Item = ([Vec3; 3], u32)> + 'a {
+fn triangles<'a>(world: &'a World, objects: &'a [u32]) -> impl Iterator<Item = [Vec3; 3]> + 'a {
     objects.iter().flat_map(move |&object| {
         let range = &world.objects()[object as usize].triangles;
         let triangles = &world.triangles()[range.start as usize..range.end as usize];
         triangles
             .iter()
-            .map(move |it| (it.map(|vertex| world.positions()[vertex as usize]), object))
+            .map(|it| it.map(|vertex| world.positions()[vertex as usize]))
     })
 }
 
@@ -344,162 +323,4 @@ fn halved([a, b, c]: [Vec3; 3]) -> [[Vec3; 3]; 2] {
     };
     let middle = 0.5 * (p + q);
     [[p, middle, r], [middle, q, r]]
-}
-
-/// All directions within an angle of an axis.
-#[derive(Clone, Copy, Debug)]
-struct Cap {
-    axis: Vec3,
-    /// In radians.
-    radius: f32,
-}
-
-impl Cap {
-    fn new(axis: Vec3, radius: f32) -> Self {
-        Self { axis, radius }
-    }
-
-    /// A cap around the directions to a triangle; `None` where it is as wide as a hemisphere.
-    fn around(corners: [Vec3; 3]) -> Option<Self> {
-        let [a, b, c] = corners.map(Vec3::normalize_or_zero);
-        let axis = (a + b + c).try_normalize()?;
-        let radius = [a, b, c]
-            .map(|it| (it - axis).length())
-            .into_iter()
-            .fold(0.0, f32::max);
-        // The chord of an angle below a right one; a cap that wide is convex.
-        (radius < 1.2).then(|| Self::new(axis, 2.0 * (0.5 * radius).asin()))
-    }
-
-    fn meets(&self, other: &Self) -> bool {
-        // The chord's length is 2 sin(angle / 2), which loses no digits to a cosine near one.
-        let reach = 0.5 * (self.radius + other.radius);
-        if reach >= std::f32::consts::FRAC_PI_2 {
-            return true;
-        }
-        let chord = 2.0 * reach.sin();
-        (self.axis - other.axis).length_squared() <= chord * chord
-    }
-}
-
-/// The caps around the cells of a square of directions, for each level of their tree.
-struct Cells {
-    finest: Vec<Cap>,
-    /// The levels above, from the coarsest; made when first asked for, by a wide cap.
-    coarser: OnceLock<Vec<Vec<Cap>>>,
-    /// The point of the square for a direction.
-    inverse: Box<dyn Fn(Vec3) -> Vec2 + Sync>,
-    /// The least angle, in radians, between the directions of two points of the square, relative to
-    /// the points' distance.
-    least_stretch: f32,
-    /// Whether the map goes on from one side of the square to another.
-    wraps: bool,
-}
-
-impl Cells {
-    fn of_cone(frame: &Frame, cone: Cone) -> Self {
-        let frame = *frame;
-        // Where the square becomes a disc, 2 by 0.568 (the smaller singular value of the concentric
-        // map, at its diagonals); from there to the cap, across the radius at its edge.
-        let chord = (cone.solid_angle() / std::f32::consts::PI).sqrt();
-        let across = (0.5 + 0.5 * cone.cosine()).max(0.0).sqrt();
-        Self {
-            finest: finest(&|at| frame.to_world(cone.sample_concentric(at).value)),
-            coarser: OnceLock::new(),
-            inverse: Box::new(move |direction| cone.invert_concentric(frame.to_local(direction))),
-            least_stretch: 2.0 * 0.568 * chord * across,
-            wraps: false,
-        }
-    }
-
-    fn of_sphere() -> Self {
-        Self {
-            finest: finest(&|at| square_to_sphere_octahedral(at).value),
-            coarser: OnceLock::new(),
-            inverse: Box::new(sphere_octahedral_to_square),
-            // The whole sphere over the largest singular value, 2 sqrt(3.82) by 2 at the equator.
-            least_stretch: 1.6,
-            wraps: true,
-        }
-    }
-
-    /// The radius of the cell in the middle, in radians.
-    fn radius(&self) -> f32 {
-        let middle = RESOLUTION / 2;
-        self.cap(LEVELS, middle, middle).radius
-    }
-
-    fn cap(&self, level: u32, column: u32, row: u32) -> &Cap {
-        let cell = ((row << level) + column) as usize;
-        if level == LEVELS {
-            return &self.finest[cell];
-        }
-        let levels = self.coarser.get_or_init(|| {
-            let mut levels = vec![coarser(&self.finest, RESOLUTION as usize)];
-            while let Some(last) = levels.last().filter(|it| it.len() > 1) {
-                levels.push(coarser(last, last.len().isqrt()));
-            }
-            levels.reverse();
-            levels
-        });
-        &levels[level as usize][cell]
-    }
-}
-
-/// The caps around the finest cells, row by row.
-fn finest(direction: &dyn Fn(Vec2) -> Vec3) -> Vec<Cap> {
-    let at = |x: f32, y: f32| {
-        let point = Vec2::new(x, y) / RESOLUTION as f32;
-        direction(point.min(Vec2::splat(1.0f32.next_down()))).normalize()
-    };
-    let side = RESOLUTION as usize;
-    let row_of_corners = |row: usize| -> Vec<Vec3> {
-        (0..=side)
-            .map(|column| at(column as f32, row as f32))
-            .collect()
-    };
-    let mut caps = Vec::with_capacity(side * side);
-    let mut above = row_of_corners(0);
-    for row in 0..side {
-        let below = row_of_corners(row + 1);
-        for column in 0..side {
-            let axis = at(column as f32 + 0.5, row as f32 + 0.5);
-            let corners = [
-                above[column],
-                above[column + 1],
-                below[column],
-                below[column + 1],
-            ];
-            let chord = corners
-                .map(|it| (it - axis).length())
-                .into_iter()
-                .fold(0.0, f32::max);
-            caps.push(Cap::new(
-                axis,
-                CELL_MARGIN * 2.0 * (0.5 * chord).min(1.0).asin(),
-            ));
-        }
-        above = below;
-    }
-    caps
-}
-
-/// The caps of the next coarser level, each around those of the four cells in it.
-fn coarser(caps: &[Cap], side: usize) -> Vec<Cap> {
-    let half = side / 2;
-    let mut merged = Vec::with_capacity(half * half);
-    for row in 0..half {
-        for column in 0..half {
-            let first = 2 * row * side + 2 * column;
-            let four = [first, first + 1, first + side, first + side + 1].map(|it| caps[it]);
-            let sum: Vec3 = four.iter().map(|it| it.axis).sum();
-            let axis = sum.normalize_or(four[0].axis);
-            let radius = four
-                .map(|it| 2.0 * (0.5 * it.axis.distance(axis)).min(1.0).asin() + it.radius)
-                .into_iter()
-                .fold(0.0, f32::max);
-            merged.push(Cap::new(axis, radius));
-        }
-    }
-    merged
 }

@@ -1,4 +1,4 @@
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 use caustics_accel::Intersect;
 use caustics_sampling::CounterRng;
@@ -11,23 +11,26 @@ use crate::emission_batch::EmissionBatch;
 use crate::lattice::Lattice;
 use crate::ledger::{EnergyLedger, Fate};
 use crate::options::{Branching, TraceError, TraceOptions};
+use crate::parallel;
 use crate::photon::{Photon, PhotonMap};
 use crate::plan::EmissionPlan;
 use crate::traced::Traced;
 use crate::tracer::PathTracer;
 use crate::wave::{WAVE, Wave};
 
-/// Photons that one task traces, and points whose photons one task divides at edges: few enough to balance,
-/// enough that what a task begins with costs little. As many for any number of threads, so that what comes of
-/// it is the same.
-const CHUNK: RangeInclusive<u32> = 256..=2048;
+/// The least photons that one task traces, and points whose photons one task divides at edges: what a task
+/// begins with costs little beside them.
+const LEAST_OF_TASK: u32 = 256;
+
+/// The most, so that what a task holds stays small.
+const MOST_OF_TASK: u32 = 2048;
 
 /// So many tasks are balanced.
 const TASKS: u32 = 64;
 
-/// What one task does of so many.
-fn chunk(all: u32) -> u32 {
-    (all / TASKS).clamp(*CHUNK.start(), *CHUNK.end())
+/// How many of `all` one task does: as many for any number of threads, so that what comes of it is the same.
+fn of_task(all: u32) -> u32 {
+    (all / TASKS).clamp(LEAST_OF_TASK, MOST_OF_TASK)
 }
 
 /// Traces photons from all lights of `world` and returns those that landed after at least one
@@ -199,40 +202,32 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
             .reflected_at(self.plan.boundaries())
     }
 
-    fn trace_chunks<const N: usize>(
+    fn trace_tasks<const N: usize>(
         &self,
         photons: Range<u32>,
         progress: &(dyn Fn(u32) + Sync),
     ) -> Traced {
-        let size = chunk(photons.len() as u32);
-        let chunks = (photons.len() as u32).div_ceil(size);
-        let run = |chunk: u32| {
-            let start = photons.start + chunk * size;
+        let size = of_task(photons.len() as u32);
+        let tasks = (photons.len() as u32).div_ceil(size);
+        let parts = parallel::made(tasks, |task| {
+            let start = photons.start + task * size;
             let range = start..photons.end.min(start.saturating_add(size));
             let finished = range.len() as u32;
             let traced = self.trace_range::<N>(range);
             progress(finished);
             traced
-        };
-        #[cfg(feature = "parallel")]
-        let parts: Vec<Traced> = {
-            use rayon::prelude::*;
-            (0..chunks).into_par_iter().map(run).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let parts: Vec<Traced> = (0..chunks).map(run).collect();
-
+        });
         Traced::joined(parts)
     }
 
     /// Traces the photons with these numbers, on all threads.
     pub(crate) fn traced(&self, photons: Range<u32>, progress: &(dyn Fn(u32) + Sync)) -> Traced {
         if !self.options.differentials {
-            self.trace_chunks::<0>(photons, progress)
+            self.trace_tasks::<0>(photons, progress)
         } else if self.planned.emitter().dimensions() == 2 {
-            self.trace_chunks::<2>(photons, progress)
+            self.trace_tasks::<2>(photons, progress)
         } else {
-            self.trace_chunks::<4>(photons, progress)
+            self.trace_tasks::<4>(photons, progress)
         }
     }
 
@@ -260,22 +255,14 @@ impl<'a, I: Intersect + ?Sized> Batch<'a, I> {
         if !self.options.divide_edges || self.options.branching != Branching::SplitAll {
             return traced.checked(lattice, points);
         }
-        let size = chunk(points.len() as u32);
-        let chunks = (points.len() as u32).div_ceil(size);
-        let parts: Vec<(Vec<Photon>, EnergyLedger)> = traced.with_neighbours(lattice, |photons| {
-            let check = |chunk: u32| {
-                let start = points.start + chunk * size;
+        let size = of_task(points.len() as u32);
+        let tasks = (points.len() as u32).div_ceil(size);
+        let parts = traced.with_neighbours(lattice, |photons| {
+            parallel::made(tasks, |task| {
+                let start = points.start + task * size;
                 let end = points.end.min(start.saturating_add(size));
                 EdgeTracer::new(self).checked(photons, start..end)
-            };
-            #[cfg(feature = "parallel")]
-            let parts = {
-                use rayon::prelude::*;
-                (0..chunks).into_par_iter().map(check).collect()
-            };
-            #[cfg(not(feature = "parallel"))]
-            let parts = (0..chunks).map(check).collect();
-            parts
+            })
         });
         let mut checked = Vec::with_capacity(parts.iter().map(|(it, _)| it.len()).sum());
         for (mut photons, ledger) in parts {
