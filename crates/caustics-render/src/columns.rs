@@ -1,7 +1,8 @@
 use glam::Vec3;
 
-use crate::footprint::{Density, Gate};
+use crate::density::Density;
 use crate::footprint_kernel::FootprintKernel;
+use crate::gate::Gate;
 use crate::gbuffer::Texel;
 
 /// Points in space or directions, each coordinate in a list of its own, so that loops over many

@@ -1,6 +1,6 @@
 use glam::Vec3;
 
-use crate::footprint::MIN_NORMAL_COSINE;
+use crate::gate::MIN_NORMAL_COSINE;
 use crate::gbuffer::{GBuffer, Texel};
 
 /// By how much unit normals of one plane may differ.

@@ -3,31 +3,15 @@ use caustics_geometry::Aabb;
 use caustics_trace::Photon;
 use glam::Vec3;
 
+use crate::density::{Adjustment, Density};
 use crate::error::RenderError;
+use crate::extent_bounds::ExtentBounds;
 use crate::eye::Receiver;
-use crate::footprint::{Adjustment, Density, ExtentBounds, FootprintOptions};
+use crate::footprint::FootprintOptions;
 use crate::footprint_piece::{Cutting, Footprint, Piece, Target};
+use crate::parallel;
 use crate::thinning::thin_wide;
 use crate::truncated_kernel::Kernels;
-
-/// Footprints' spacings below this part of all are the close ones.
-const CLOSE_QUANTILE: f32 = 0.1;
-
-/// The least standard deviation of a footprint, relative to that of the close ones.
-const LEAST_EXTENT: f32 = 0.125;
-
-/// The least standard deviation of a footprint, relative to the diagonal of the box around all
-/// photons: below it, the rounding of positions would show.
-const LEAST_OF_SCENE: f32 = 1e-6;
-
-/// The least standard deviation of a footprint where nothing else tells, in metres.
-const LEAST_METRES: f32 = 1e-9;
-
-/// The largest extent of a footprint, relative to the same diagonal.
-const MOST_OF_SCENE: f32 = 1e3;
-
-/// The largest extent of a footprint where one photon is all there is, in metres.
-const MOST_METRES: f32 = 1e9;
 
 /// The area of boxes that one more piece must save, relative to a photon's share of the surface of
 /// the box around all photons.
@@ -141,7 +125,7 @@ impl FootprintGather {
         } else {
             around.surface_area()
         };
-        let extents = extent_bounds(&photons, options, diagonal);
+        let extents = ExtentBounds::of(&photons, options, diagonal);
         let kernels = Kernels::of(options);
 
         let mut stats = GatherStats {
@@ -149,7 +133,7 @@ impl FootprintGather {
             ..GatherStats::default()
         };
         let mut densities = Vec::with_capacity(photons.len());
-        let prepared = in_chunks(&photons, |_, photon| {
+        let prepared = parallel::of_all(&photons, CHUNK, |photon| {
             Density::within(photon, &extents, options, kernels.get(photon.coverage))
         });
         for one in prepared {
@@ -347,29 +331,11 @@ impl FootprintGather {
     }
 }
 
-/// Computes something for each item, in parallel where the feature allows, in their order.
-fn in_chunks<T: Sync, R: Send>(items: &[T], make: impl Fn(u32, &T) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        let numbered = items.par_iter().with_min_len(CHUNK).enumerate();
-        numbered
-            .map(|(index, item)| make(index as u32, item))
-            .collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    items
-        .iter()
-        .zip(0..)
-        .map(|(item, index)| make(index, item))
-        .collect()
-}
-
 /// All footprints' pieces, in their order, and the boxes around them.
 fn cut(densities: &[Density], cutting: &Cutting) -> (Vec<Piece>, Vec<Aabb>) {
     let chunks: Vec<&[Density]> = densities.chunks(CHUNK).collect();
-    let parts = in_chunks(&chunks, |number, chunk| {
-        let first = number * CHUNK as u32;
+    let parts = parallel::made(chunks.len() as u32, |number| {
+        let (chunk, first) = (chunks[number as usize], number * CHUNK as u32);
         let mut part = Vec::with_capacity(2 * chunk.len());
         for (density, index) in chunk.iter().zip(first..) {
             cutting.cut(index, density, |piece, bounds| part.push((piece, bounds)));
@@ -413,34 +379,6 @@ fn is_finite(photon: &Photon) -> bool {
     ]
     .iter()
     .all(|vector| vector.is_finite())
-}
-
-fn extent_bounds(photons: &[Photon], options: &FootprintOptions, diagonal: f32) -> ExtentBounds {
-    let spacing = |photon: &Photon| {
-        let [a, b] = photon.axes;
-        a.cross(b).length().sqrt()
-    };
-    let mut spacings: Vec<f32> = photons
-        .iter()
-        .map(spacing)
-        .filter(|spacing| *spacing > 0.0 && spacing.is_finite())
-        .collect();
-    let close = if spacings.is_empty() {
-        // No footprint has an area: as if the photons shared a square of the scene's size.
-        diagonal / (photons.len().max(1) as f32).sqrt()
-    } else {
-        let rank = (CLOSE_QUANTILE * spacings.len() as f32) as usize;
-        *spacings.select_nth_unstable_by(rank, f32::total_cmp).1
-    };
-    let least = LEAST_EXTENT * options.scale * close;
-    ExtentBounds {
-        least: least.max(LEAST_OF_SCENE * diagonal).max(LEAST_METRES),
-        most: if diagonal > 0.0 {
-            MOST_OF_SCENE * diagonal
-        } else {
-            MOST_METRES
-        },
-    }
 }
 
 #[cfg(test)]

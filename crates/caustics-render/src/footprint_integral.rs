@@ -2,8 +2,10 @@ use caustics_trace::{Coverage, Photon};
 use glam::{Mat2, Vec2, Vec3};
 
 use crate::covariance::Covariance;
-use crate::footprint::{Density, FootprintOptions, Gate, incident_cosine};
+use crate::density::{Density, incident_cosine};
+use crate::footprint::FootprintOptions;
 use crate::footprint_kernel::FootprintKernel;
+use crate::gate::Gate;
 use crate::gbuffer::Texel;
 use crate::pixel_integral::PixelGaussian;
 use crate::screen::Screen;

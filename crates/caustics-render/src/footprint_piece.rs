@@ -2,8 +2,9 @@ use caustics_geometry::Aabb;
 use caustics_trace::Coverage;
 use glam::{Vec2, Vec3};
 
+use crate::density::Density;
 use crate::eye::Receiver;
-use crate::footprint::{Density, Gate};
+use crate::gate::Gate;
 use crate::truncated_kernel::TruncatedKernel;
 
 /// The most pieces that a layer is cut into.

@@ -4,7 +4,7 @@ use caustics_scene::{Brdf, Camera, World};
 use glam::Vec3;
 
 use crate::error::RenderError;
-use crate::in_order;
+use crate::parallel;
 use crate::picture::PictureOptions;
 use crate::pixel_samples::PixelSamples;
 use crate::screen::Screen;
@@ -74,9 +74,9 @@ impl GBuffer {
             width,
             height,
         };
-        let rows = in_order::made(height, |y| looker.row(y));
+        let rows = parallel::made(height, |y| looker.row(y));
         let centers: Vec<Option<Texel>> = rows.into_iter().flatten().collect();
-        let refined = in_order::made(height, |y| looker.refine_row(y, &centers));
+        let refined = parallel::made(height, |y| looker.refine_row(y, &centers));
 
         let mut buffer = Self {
             screen: Screen::new(camera, width, height),

@@ -2,8 +2,9 @@ use caustics_scene::Brdf;
 use glam::Vec3;
 
 use crate::columns::ColumnsMut;
+use crate::density::Density;
 use crate::eye::{reflectance, serving_normal};
-use crate::footprint::{Density, Gate};
+use crate::gate::Gate;
 use crate::gbuffer::{GBuffer, Texel};
 
 /// The most by which a half vector may turn from one pixel of a level to the next, relative to the

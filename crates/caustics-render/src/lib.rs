@@ -87,9 +87,11 @@
 
 mod columns;
 mod covariance;
+mod density;
 mod direct;
 mod error;
 mod estimate;
+mod extent_bounds;
 mod eye;
 mod flat_objects;
 mod footprint;
@@ -97,10 +99,11 @@ mod footprint_gather;
 mod footprint_integral;
 mod footprint_kernel;
 mod footprint_piece;
+mod gate;
 mod gbuffer;
 mod gloss;
-mod in_order;
 mod nearest;
+mod parallel;
 mod picture;
 mod pixel;
 mod pixel_integral;

@@ -11,6 +11,24 @@ pub(crate) fn made<T: Send>(count: u32, make: impl Fn(u32) -> T + Sync + Send) -
     (0..count).map(make).collect()
 }
 
+/// What is made of each of some items, in their order, by tasks of no fewer than `least`.
+pub(crate) fn of_all<T: Sync, R: Send>(
+    items: &[T],
+    least: usize,
+    make: impl Fn(&T) -> R + Sync + Send,
+) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        items.par_iter().with_min_len(least).map(make).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    {
+        let _ = least;
+        items.iter().map(make).collect()
+    }
+}
+
 /// Does each of some tasks, which are large.
 pub(crate) fn each<T: Send>(tasks: Vec<T>, run: impl Fn(T) + Sync + Send) {
     #[cfg(feature = "parallel")]

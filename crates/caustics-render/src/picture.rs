@@ -11,8 +11,8 @@ use crate::eye::{EyeTracer, Receiver};
 use crate::footprint::FootprintOptions;
 use crate::footprint_gather::FootprintGather;
 use crate::gbuffer::GBuffer;
-use crate::in_order;
 use crate::nearest::NearestEstimate;
+use crate::parallel;
 use crate::pixel::PixelSamples;
 use crate::splat::splat;
 
@@ -189,7 +189,7 @@ pub fn render<I: Intersect + ?Sized>(
         progress(1);
         finished
     };
-    let rows: Vec<Row> = in_order::made(options.height, finish);
+    let rows: Vec<Row> = parallel::made(options.height, finish);
 
     let mut picture = Picture {
         direct: Image::new(options.width, options.height)?,

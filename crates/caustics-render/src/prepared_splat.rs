@@ -2,9 +2,11 @@ use caustics_trace::Photon;
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
-use crate::footprint::{Density, FootprintOptions, Gate};
+use crate::density::Density;
+use crate::footprint::FootprintOptions;
 use crate::footprint_integral::{FootprintIntegral, integrated_sigma};
 use crate::footprint_kernel::FootprintKernel;
+use crate::gate::Gate;
 use crate::gbuffer::Texel;
 use crate::screen::Screen;
 use crate::splat_bounds::Bounds;

@@ -4,7 +4,7 @@ use caustics_trace::Photon;
 use crate::error::RenderError;
 use crate::footprint::FootprintOptions;
 use crate::gbuffer::GBuffer;
-use crate::in_order;
+use crate::parallel;
 use crate::prepared_splat::{LEVELS, Prepared, Splat};
 use crate::screen::Screen;
 use crate::splat_level::Level;
@@ -14,6 +14,9 @@ use crate::truncated_kernel::Kernels;
 /// Photons that are prepared at a time: few enough that what is ready stays in the caches until every
 /// band of rows has drawn it.
 const BATCH: usize = 1 << 14;
+
+/// The least photons that one task prepares.
+const LEAST_PREPARED: usize = 256;
 
 /// What became of the photons that were splatted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +54,7 @@ pub fn splat(
         }
         passes
     };
-    let (mut passes, surroundings) = in_order::both(passes, || Surroundings::of(buffer));
+    let (mut passes, surroundings) = parallel::both(passes, || Surroundings::of(buffer));
     let kernels = Kernels::of(options);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
@@ -112,7 +115,7 @@ impl<'a> Pass<'a> {
             prepared
         };
         let levels = self.levels.iter_mut().enumerate().collect();
-        in_order::each(levels, |(number, level)| {
+        parallel::each(levels, |(number, level)| {
             level.accumulate(prepared, surroundings, number);
         });
     }
@@ -134,20 +137,9 @@ fn prepare(
     options: &FootprintOptions,
     kernels: Kernels,
 ) -> Vec<Prepared> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        photons
-            .par_iter()
-            .with_min_len(1024)
-            .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernels))
-            .collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    photons
-        .iter()
-        .map(|photon| Splat::prepare(photon, screen, surroundings, options, kernels))
-        .collect()
+    parallel::of_all(photons, LEAST_PREPARED, |photon| {
+        Splat::prepare(photon, screen, surroundings, options, kernels)
+    })
 }
 
 /// What other surfaces catch of photons whose plane is seen edge-on, or from behind.
@@ -166,7 +158,7 @@ fn caught(
         use rayon::prelude::*;
         photons
             .par_iter()
-            .with_min_len(1024)
+            .with_min_len(LEAST_PREPARED)
             .filter_map(one)
             .collect()
     }

@@ -1,6 +1,6 @@
 use glam::{Vec2, Vec3};
 
-use crate::footprint::Density;
+use crate::density::Density;
 use crate::screen::Screen;
 
 /// The part of the screen that a footprint may overlap, in pixels.

@@ -7,7 +7,7 @@ use glam::{IVec2, Vec2, Vec3};
 use crate::columns::{Columns, TexelColumns};
 use crate::gbuffer::{GBuffer, Texel};
 use crate::gloss::GlossyTexels;
-use crate::in_order;
+use crate::parallel;
 use crate::prepared_splat::{Prepared, STRIDE};
 use crate::splat_band::BandTask;
 use crate::surroundings::Surroundings;
@@ -240,7 +240,7 @@ impl<'a> Level<'a> {
                 splats: &lists[number],
             });
         }
-        in_order::each(tasks, |task| task.run(prepared));
+        parallel::each(tasks, |task| task.run(prepared));
     }
 
     pub(crate) fn add_coarser(&mut self, coarse: &Self) {
@@ -259,7 +259,7 @@ impl<'a> Level<'a> {
             .chunks_mut(pixels)
             .zip(self.texels.chunks(pixels));
         let bands = bands.enumerate().collect();
-        in_order::each(bands, |(number, (mut light, texels))| {
+        parallel::each(bands, |(number, (mut light, texels))| {
             for (offset, texel) in texels.iter().enumerate() {
                 if let Some(texel) = texel {
                     let at = place(number * pixels + offset);
@@ -330,7 +330,7 @@ impl<'a> Level<'a> {
         };
         let band = BAND * self.width;
         let bands = pixels.chunks_mut(band).zip(self.texels.chunks(band));
-        in_order::each(bands.enumerate().collect(), |(number, (pixels, texels))| {
+        parallel::each(bands.enumerate().collect(), |(number, (pixels, texels))| {
             for (index, (pixel, texel)) in (number * band..).zip(pixels.iter_mut().zip(texels)) {
                 if let Some(texel) = texel {
                     add(pixel, texel, self.light.get(index));
@@ -348,7 +348,7 @@ fn by_pixel<T: Send>(
     [width, height]: [usize; 2],
     of: impl Fn(usize, usize) -> T + Sync + Send,
 ) -> Vec<T> {
-    let rows = in_order::made(height as u32, |y| -> Vec<T> {
+    let rows = parallel::made(height as u32, |y| -> Vec<T> {
         (0..width).map(|x| of(x, y as usize)).collect()
     });
     rows.into_iter().flatten().collect()

@@ -1,7 +1,8 @@
 use glam::{Vec2, Vec3};
 
+use crate::density::Density;
 use crate::flat_objects::curved_objects;
-use crate::footprint::{Density, Gate};
+use crate::gate::Gate;
 use crate::gbuffer::{GBuffer, Texel};
 
 /// Pixels along the sides of the smallest tiles.

@@ -2,7 +2,8 @@ use std::f32::consts::{PI, SQRT_2};
 
 use caustics_trace::Coverage;
 
-use crate::footprint::{FootprintOptions, MAX_SLIDE};
+use crate::density::MAX_SLIDE;
+use crate::footprint::FootprintOptions;
 use crate::footprint_kernel::FootprintKernel;
 
 /// The Gaussian's value in its middle if it ends at three standard deviations:
