@@ -8,6 +8,7 @@ mod builds;
 mod contest;
 mod instances;
 mod pictures;
+mod searchers;
 mod searches;
 mod tables;
 mod traces;

@@ -5,6 +5,8 @@
 
 mod brdf;
 #[cfg(feature = "gltf")]
+mod gltf_errors;
+#[cfg(feature = "gltf")]
 mod gltf_features;
 #[cfg(feature = "gltf")]
 mod gltf_materials;
