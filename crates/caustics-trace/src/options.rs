@@ -74,8 +74,8 @@ pub struct TraceOptions {
     /// rays find where, and what of the cell is left is traced in parts, as is the light of sheets that are
     /// narrower than a cell; light that met more than 28 surfaces is not. Edges become sharp and stand where
     /// they are, and what lands near a silhouette is where it is: without, the error of the ten scenes of
-    /// `docs/footprints.md` is 2.4 times as large in the mean. Of 65,536 photons tracing takes a third longer for
-    /// it in `p06_wave_plane` and four fifths longer in `p03_cognac`. It needs
+    /// `docs/footprints.md` is 2.4 times as large in the mean. Of 65,536 photons tracing takes a fifth longer for
+    /// it in `p06_wave_plane` and twice as long in `p03_cognac`. It needs
     /// [`check_footprints`](Self::check_footprints) and [`Branching::SplitAll`], and does nothing without.
     pub divide_edges: bool,
     /// Whether footprints that [overlap](crate::Coverage::Overlap) are reflected where their receiver ends, so
