@@ -9,7 +9,7 @@ use common::tracing::{
     Difference, SCENES, Stage, ledger_of, shared_tracer, trace_on_gpu, trails_by_cpu, unlike_lines,
 };
 
-const PHOTONS: u32 = 100_000;
+const PHOTONS: u32 = 50_000;
 
 #[test]
 fn the_same_photons_land_in_the_same_places() {
