@@ -13,7 +13,7 @@ Times and scores every estimate on the public scenes, and writes the tables and 
   --estimates A,B      estimates (default: all)
   --photons N,N        photons emitted (default: 65536,262144,2000000)
   --ladder N,N         further counts, for the default estimate alone
-                       (default: powers of the root of two from 1024 to 32768, then
+                       (default: powers of the root of two from 512 to 46341, then
                        1048576,4194304; `none` for none)
   --counted N          photons of the picture that tells a reference's noise from errors, not timed
                        (default: 16000000; 0 for none)
@@ -68,8 +68,8 @@ impl Arguments {
             estimates: Estimate::ALL.to_vec(),
             photons: vec![65_536, 262_144, 2_000_000],
             ladder: vec![
-                1024, 1448, 2048, 2896, 4096, 5793, 8192, 11_585, 16_384, 23_170, 32_768,
-                1_048_576, 4_194_304,
+                512, 724, 1024, 1448, 2048, 2896, 4096, 5793, 8192, 11_585, 16_384, 23_170, 32_768,
+                46_341, 1_048_576, 4_194_304,
             ],
             counted: 16_000_000,
             patience: Patience {
