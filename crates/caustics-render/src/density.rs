@@ -4,7 +4,6 @@ use glam::{Vec2, Vec3};
 use crate::covariance::Covariance;
 use crate::extent_bounds::ExtentBounds;
 use crate::footprint::FootprintOptions;
-use crate::footprint_kernel::FootprintKernel;
 use crate::gate::Gate;
 use crate::truncated_kernel::TruncatedKernel;
 
@@ -276,17 +275,14 @@ impl Density {
         self.axes.map(|axis| self.kernel.reach() * axis)
     }
 
-    /// No point farther from the center than this, in metres, belongs to the footprint.
+    /// No point farther from the center than this, in metres, belongs to the footprint, but for the
+    /// corners of a tent, which may lie farther by the root of two.
+    ///
+    /// It depends on the covariance only, whatever axes that is written in: so a blur by a pixel adds no more
+    /// than its own radius. How far a tent's corners lie depends on those axes, which a small blur may turn.
     pub(crate) fn radius(&self) -> f32 {
         let [a, b] = self.half_extents();
-        let ellipse = a.length_squared() + b.length_squared();
-        // A tent reaches into the corners of the parallelogram, an ellipse does not.
-        let corners = if self.kernel.shape == FootprintKernel::Tent {
-            2.0 * a.dot(b).abs()
-        } else {
-            0.0
-        };
-        (ellipse + corners).sqrt()
+        (a.length_squared() + b.length_squared()).sqrt()
     }
 }
 
@@ -341,9 +337,50 @@ pub(crate) struct Adjustment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::footprint_kernel::FootprintKernel;
     use crate::truncated_kernel::Kernels;
 
-    /// Light falls nowhere beyond the radius, and close to it, for footprints that lie askew.
+    fn landed(axes: [Vec3; 2]) -> Photon {
+        Photon {
+            position: Vec3::ZERO,
+            incoming: Vec3::NEG_Y,
+            flux: Vec3::ONE,
+            normal: Vec3::Y,
+            axes,
+            object: 0,
+            events: 1,
+            source: caustics_trace::FootprintSource::Differential,
+            coverage: caustics_trace::Coverage::Cell,
+        }
+    }
+
+    /// A gather looks that much farther for what a pixel's blur lights.
+    #[test]
+    fn a_blur_adds_no_more_than_its_own_radius() {
+        for kernel in FootprintKernel::ALL {
+            let options = FootprintOptions {
+                kernel,
+                ..FootprintOptions::default()
+            };
+            let kernel = Kernels::of(&options).get(caustics_trace::Coverage::Cell);
+            // Streaks at all angles to the axes that a covariance is written in.
+            for step in 0..1000 {
+                let (sine, cosine) = (step as f32 * 0.1).sin_cos();
+                let axis = Vec3::new(cosine, 0.0, sine);
+                let axes = [3.3 * axis, 0.002 * Vec3::new(-sine, 0.0, cosine)];
+                let density = Density::new(&landed(axes), None, &options, kernel);
+                let density = density.expect("it has an area");
+                let pixel = [0.05 * Vec3::X, 0.05 * Vec3::Z];
+                let blurred = density.blurred(&pixel).expect("it has an area");
+                let blur = kernel.reach() * (2.0 * kernel.shape.pixel_variance()).sqrt() * 0.05;
+                let most = 1.0001 * (density.radius() + blur);
+                assert!(blurred.radius() <= most, "{:?}, {step}", kernel.shape);
+            }
+        }
+    }
+
+    /// Light falls nowhere beyond the radius, or a tent's corners, and close to it, for footprints that
+    /// lie askew.
     #[test]
     fn the_radius_is_how_far_light_reaches() {
         for kernel in FootprintKernel::ALL {
@@ -351,17 +388,7 @@ mod tests {
                 kernel,
                 ..FootprintOptions::default()
             };
-            let photon = Photon {
-                position: Vec3::ZERO,
-                incoming: Vec3::NEG_Y,
-                flux: Vec3::ONE,
-                normal: Vec3::Y,
-                axes: [Vec3::new(1.0, 0.0, 0.8), Vec3::new(0.1, 0.0, 0.3)],
-                object: 0,
-                events: 1,
-                source: caustics_trace::FootprintSource::Differential,
-                coverage: caustics_trace::Coverage::Cell,
-            };
+            let photon = landed([Vec3::new(1.0, 0.0, 0.8), Vec3::new(0.1, 0.0, 0.3)]);
             let kernel = Kernels::of(&options).get(photon.coverage);
             let density = Density::new(&photon, None, &options, kernel).expect("it has an area");
             let radius = density.radius();
@@ -374,11 +401,17 @@ mod tests {
                     farthest = farthest.max(far);
                 }
             }
-            assert!(farthest <= radius, "{kernel:?}: {farthest} of {radius}");
+            let corners = kernel.outer_reach() / kernel.reach();
+            assert!(
+                farthest <= corners * radius,
+                "{:?}: {farthest} of {radius}",
+                kernel.shape
+            );
             assert!(
                 // A disc reaches 1 over the root of two of it.
                 farthest > 0.7 * radius,
-                "{kernel:?}: {farthest} of {radius}"
+                "{:?}: {farthest} of {radius}",
+                kernel.shape
             );
         }
     }

@@ -267,7 +267,7 @@ fn density_spread(
     return d;
 }
 
-// No point farther from the center than this belongs to the footprint.
+// No point farther from the center than this belongs to the footprint, but for a tent's corners.
 fn density_radius(d: Density) -> f32 {
     let r = kernel_reach(d.truncation);
     return r * sqrt(dot(d.axis_u, d.axis_u) + dot(d.axis_v, d.axis_v));
