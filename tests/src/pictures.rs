@@ -390,6 +390,47 @@ mod tests {
     }
 
     #[test]
+    fn errors_are_ranked_over_lit_pixels_alone() {
+        // A quarter of the pixels dark, the others even, and two of them wrong: by all of the mean in a pixel
+        // that is 9 times as bright, and by half of it in an even one.
+        let mut irradiance = vec![4.0; SIZE * SIZE];
+        irradiance[..SIZE * SIZE / 4].fill(0.0);
+        let (bright, even) = (SIZE * SIZE - 3, SIZE * SIZE / 2 + 7);
+        irradiance[bright] = 36.0;
+        let picture = ExactPicture {
+            name: "even",
+            scene: Scene::new(),
+            events: 1,
+            center: DVec2::ZERO,
+            half: 1.0,
+            height: 0.0,
+            is_lit_from_below: false,
+            distance: 1.0,
+            irradiance,
+        };
+        let mean = picture.irradiance.iter().sum::<f64>() / (SIZE * SIZE) as f64;
+        let mut test: Vec<f64> = picture
+            .irradiance
+            .iter()
+            .map(|it| it + 0.01 * mean)
+            .collect();
+        // What is not lit counts for the mean error alone.
+        test[3] = 0.2 * mean;
+        test[bright] = 36.0 + mean;
+        test[even] = 4.0 + 0.5 * mean;
+        let found = picture.error(&test);
+        let is_near = |one: f64, other: f64| (one - other).abs() < 1e-9;
+        assert!(is_near(found.median, 0.01), "{found:?}");
+        // Of 12,288 lit pixels the 99.99th percentile is the second largest error: the bright pixel's is the
+        // largest in the mean, but not in what the pixel has.
+        assert!(is_near(found.outliers, 0.5), "{found:?}");
+        assert_eq!(found.worst, [bright % SIZE, bright / SIZE]);
+        assert!(is_near(found.off_by, mean / (36.0 + mean)), "{found:?}");
+        let dark = 0.2f64.powi(2) / 0.01;
+        assert!(found.relative_mse > dark / (SIZE * SIZE) as f64);
+    }
+
+    #[test]
     fn rings_add_up_to_the_flux_of_the_lens() -> Result<(), TestError> {
         let picture = ExactPicture::sphere_lens()?;
         let area = (2.0 * picture.half / SIZE as f64).powi(2);
