@@ -426,8 +426,13 @@ mod tests {
         assert!(is_near(found.outliers, 0.5), "{found:?}");
         assert_eq!(found.worst, [bright % SIZE, bright / SIZE]);
         assert!(is_near(found.off_by, mean / (36.0 + mean)), "{found:?}");
-        let dark = 0.2f64.powi(2) / 0.01;
-        assert!(found.relative_mse > dark / (SIZE * SIZE) as f64);
+        let (all, steady) = ((SIZE * SIZE) as f64, 0.01 * mean * mean);
+        let alike = (0.25 * all - 1.0) / steady + (0.75 * all - 2.0) / (16.0 + steady);
+        let expected = (0.01 * mean).powi(2) * alike
+            + (0.2 * mean).powi(2) / steady
+            + (0.5 * mean).powi(2) / (16.0 + steady)
+            + mean.powi(2) / (36.0 * 36.0 + steady);
+        assert!(is_near(found.relative_mse, expected / all), "{found:?}");
     }
 
     #[test]

@@ -338,21 +338,8 @@ pub(crate) struct Adjustment {
 mod tests {
     use super::*;
     use crate::footprint_kernel::FootprintKernel;
+    use crate::landed::landed;
     use crate::truncated_kernel::Kernels;
-
-    fn landed(axes: [Vec3; 2]) -> Photon {
-        Photon {
-            position: Vec3::ZERO,
-            incoming: Vec3::NEG_Y,
-            flux: Vec3::ONE,
-            normal: Vec3::Y,
-            axes,
-            object: 0,
-            events: 1,
-            source: caustics_trace::FootprintSource::Differential,
-            coverage: caustics_trace::Coverage::Cell,
-        }
-    }
 
     /// A gather looks that much farther for what a pixel's blur lights.
     #[test]
@@ -368,7 +355,7 @@ mod tests {
                 let (sine, cosine) = (step as f32 * 0.1).sin_cos();
                 let axis = Vec3::new(cosine, 0.0, sine);
                 let axes = [3.3 * axis, 0.002 * Vec3::new(-sine, 0.0, cosine)];
-                let density = Density::new(&landed(axes), None, &options, kernel);
+                let density = Density::new(&landed(Vec3::ZERO, axes), None, &options, kernel);
                 let density = density.expect("it has an area");
                 let pixel = [0.05 * Vec3::X, 0.05 * Vec3::Z];
                 let blurred = density.blurred(&pixel).expect("it has an area");
@@ -388,7 +375,10 @@ mod tests {
                 kernel,
                 ..FootprintOptions::default()
             };
-            let photon = landed([Vec3::new(1.0, 0.0, 0.8), Vec3::new(0.1, 0.0, 0.3)]);
+            let photon = landed(
+                Vec3::ZERO,
+                [Vec3::new(1.0, 0.0, 0.8), Vec3::new(0.1, 0.0, 0.3)],
+            );
             let kernel = Kernels::of(&options).get(photon.coverage);
             let density = Density::new(&photon, None, &options, kernel).expect("it has an area");
             let radius = density.radius();

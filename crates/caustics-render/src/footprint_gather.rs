@@ -385,22 +385,9 @@ fn is_finite(photon: &Photon) -> bool {
 mod tests {
     use super::*;
     use crate::footprint_kernel::FootprintKernel;
+    use crate::landed::landed;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
-
-    fn photon(position: Vec3, axes: [Vec3; 2]) -> Photon {
-        Photon {
-            position,
-            incoming: Vec3::NEG_Y,
-            flux: Vec3::new(1.0, 2.0, 3.0),
-            normal: Vec3::Y,
-            axes,
-            object: 0,
-            events: 1,
-            source: caustics_trace::FootprintSource::Differential,
-            coverage: caustics_trace::Coverage::Cell,
-        }
-    }
 
     #[test]
     fn nothing_lights_nothing() {
@@ -415,7 +402,7 @@ mod tests {
 
     #[test]
     fn the_middle_of_a_gaussian_has_its_flux_over_two_pi_times_its_variance() {
-        let photons = [photon(Vec3::ONE, [0.2 * Vec3::X, 0.4 * Vec3::Z])];
+        let photons = [landed(Vec3::ONE, [0.2 * Vec3::X, 0.4 * Vec3::Z])];
         for truncation in [1.0f32, 2.5, 3.0, 4.0] {
             let options = FootprintOptions {
                 scale: 0.5,
@@ -436,7 +423,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_not_finite_are_named() {
-        let good = photon(Vec3::ZERO, [Vec3::X, Vec3::Z]);
+        let good = landed(Vec3::ZERO, [Vec3::X, Vec3::Z]);
         let bad = Photon {
             flux: Vec3::new(0.0, f32::NAN, 0.0),
             ..good
@@ -450,9 +437,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_spread_is_counted() {
-        let point = photon(Vec3::ZERO, [Vec3::ZERO; 2]);
-        let line = photon(Vec3::X, [Vec3::X, Vec3::ZERO]);
-        let endless = photon(Vec3::Z, [1e30 * Vec3::X, 1e30 * Vec3::Z]);
+        let point = landed(Vec3::ZERO, [Vec3::ZERO; 2]);
+        let line = landed(Vec3::X, [Vec3::X, Vec3::ZERO]);
+        let endless = landed(Vec3::Z, [1e30 * Vec3::X, 1e30 * Vec3::Z]);
         let blinding = Photon {
             flux: Vec3::MAX,
             ..point
@@ -482,7 +469,7 @@ mod tests {
 
     #[test]
     fn a_point_that_is_no_number_is_dark() {
-        let photons = [photon(Vec3::ZERO, [Vec3::X, Vec3::Z])];
+        let photons = [landed(Vec3::ZERO, [Vec3::X, Vec3::Z])];
         let gather = FootprintGather::new(&photons, &FootprintOptions::default()).unwrap();
         let nowhere = Vec3::splat(f32::NAN);
         assert_eq!(gather.irradiance(nowhere, Vec3::Y), Vec3::ZERO);
@@ -504,7 +491,7 @@ mod tests {
                 let (sine, cosine) = (index as f32).sin_cos();
                 let place = Vec3::new(cosine, 0.0, sine) * (index as f32 * 1e-4);
                 let long = (1 + index % 50) as f32 * Vec3::new(sine, 0.0, cosine);
-                photon(place, [0.01 * long, 0.01 * Vec3::new(-cosine, 0.0, sine)])
+                landed(place, [0.01 * long, 0.01 * Vec3::new(-cosine, 0.0, sine)])
             })
             .collect();
         let lit_with = |threads: usize| -> Vec<Vec3> {

@@ -102,6 +102,8 @@ mod footprint_piece;
 mod gate;
 mod gbuffer;
 mod gloss;
+#[cfg(test)]
+mod landed;
 mod nearest;
 mod parallel;
 mod picture;
