@@ -1,9 +1,12 @@
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::density::Density;
 use crate::footprint_kernel::FootprintKernel;
 use crate::gate::Gate;
 use crate::gbuffer::Texel;
+use crate::parallel;
 
 /// Points in space or directions, each coordinate in a list of its own, so that loops over many
 /// use vector instructions.
@@ -23,12 +26,42 @@ impl Columns {
         }
     }
 
+    /// What is made of each of some items, by tasks of `task` of them.
+    pub(crate) fn of<T: Sync>(items: &[T], task: usize, make: impl Fn(&T) -> Vec3 + Sync) -> Self {
+        let mut columns = Self::zero(items.len());
+        let tasks = items.chunks(task).zip(columns.chunks_mut(task));
+        parallel::each(tasks.collect(), |(items, mut part)| {
+            for (index, item) in items.iter().enumerate() {
+                part.set(index, make(item));
+            }
+        });
+        columns
+    }
+
     pub(crate) fn get(&self, index: usize) -> Vec3 {
         Vec3::new(self.x[index], self.y[index], self.z[index])
     }
 
-    pub(crate) fn set(&mut self, index: usize, value: Vec3) {
-        [self.x[index], self.y[index], self.z[index]] = value.to_array();
+    pub(crate) fn is_zero(&self) -> bool {
+        let is_zero = |list: &[f32]| list.iter().all(|&it| it == 0.0);
+        is_zero(&self.x) && is_zero(&self.y) && is_zero(&self.z)
+    }
+
+    /// A part of each list.
+    pub(crate) fn part(&self, range: Range<usize>) -> [&[f32]; 3] {
+        [&self.x, &self.y, &self.z].map(|list| &list[range.clone()])
+    }
+
+    /// Between a row of `width` from `first` on and the next one, `down` of the way to that.
+    pub(crate) fn blend_rows(&self, first: usize, width: usize, down: f32, blend: &mut Self) {
+        let above = self.part(first..first + width);
+        let below = self.part(first + width..first + 2 * width);
+        let lists = [&mut blend.x, &mut blend.y, &mut blend.z];
+        for ((list, above), below) in lists.into_iter().zip(above).zip(below) {
+            for (value, (above, below)) in list.iter_mut().zip(above.iter().zip(below)) {
+                *value = (1.0 - down) * above + down * below;
+            }
+        }
     }
 
     /// The lists in pieces of `size`, in order.
@@ -50,6 +83,33 @@ pub(crate) struct ColumnsMut<'a> {
 }
 
 impl ColumnsMut<'_> {
+    /// `count` from `first` on.
+    pub(crate) fn part(&mut self, first: usize, count: usize) -> ColumnsMut<'_> {
+        ColumnsMut {
+            x: &mut self.x[first..first + count],
+            y: &mut self.y[first..first + count],
+            z: &mut self.z[first..first + count],
+        }
+    }
+
+    pub(crate) fn set(&mut self, index: usize, value: Vec3) {
+        [self.x[index], self.y[index], self.z[index]] = value.to_array();
+    }
+
+    /// Adds, from `begin` on, two values between each of a range of others and its next one: a quarter
+    /// of the way from either.
+    pub(crate) fn add_between(&mut self, begin: usize, others: &Columns, range: Range<usize>) {
+        let next = others.part(range.start + 1..range.end + 1);
+        let lists = [&mut *self.x, &mut *self.y, &mut *self.z];
+        for ((list, one), other) in lists.into_iter().zip(others.part(range)).zip(next) {
+            let (pairs, _) = list[begin..].as_chunks_mut::<2>();
+            for (pair, (one, other)) in pairs.iter_mut().zip(one.iter().zip(other)) {
+                pair[0] += 0.75 * one + 0.25 * other;
+                pair[1] += 0.25 * one + 0.75 * other;
+            }
+        }
+    }
+
     pub(crate) fn add(&mut self, index: usize, value: Vec3) {
         self.x[index] += value.x;
         self.y[index] += value.y;
@@ -66,19 +126,30 @@ pub(crate) struct TexelColumns {
 }
 
 impl TexelColumns {
-    pub(crate) fn new(texels: &[Option<Texel>]) -> Self {
+    /// Of all texels, by tasks of `task` of them.
+    pub(crate) fn new(texels: &[Option<Texel>], task: usize) -> Self {
         let mut columns = Self {
             position: Columns::zero(texels.len()),
             normal: Columns::zero(texels.len()),
             object: vec![0; texels.len()],
         };
-        for (index, texel) in texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                columns.position.set(index, texel.position);
-                columns.normal.set(index, texel.normal);
-                columns.object[index] = texel.object;
-            }
-        }
+        let tasks = texels
+            .chunks(task)
+            .zip(columns.position.chunks_mut(task))
+            .zip(columns.normal.chunks_mut(task))
+            .zip(columns.object.chunks_mut(task));
+        parallel::each(
+            tasks.collect(),
+            |(((texels, mut position), mut normal), object)| {
+                for (index, texel) in texels.iter().enumerate() {
+                    if let Some(texel) = texel {
+                        position.set(index, texel.position);
+                        normal.set(index, texel.normal);
+                        object[index] = texel.object;
+                    }
+                }
+            },
+        );
         columns
     }
 

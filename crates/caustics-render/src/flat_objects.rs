@@ -2,6 +2,7 @@ use glam::Vec3;
 
 use crate::gate::MIN_NORMAL_COSINE;
 use crate::gbuffer::{GBuffer, Texel};
+use crate::parallel;
 
 /// By how much unit normals of one plane may differ.
 const NORMAL_TOLERANCE: f32 = 1e-4;
@@ -12,20 +13,57 @@ const PLANE_TOLERANCE: f32 = 1e-5;
 /// An object of more planes than this counts as curved: it would take long to tell.
 const MOST_PLANES: usize = 8;
 
+/// Texels of one task.
+const CHUNK: usize = 1 << 13;
+
 /// For each object up to the last that is seen, whether it curves: whether two parts of it that a
 /// footprint may light at once lie in different planes. A box does not, since its faces stand upright on
 /// each other; stairs and spheres do.
 pub(crate) fn curved_objects(buffer: &GBuffer) -> Vec<bool> {
-    let mut planes: Vec<Planes> = Vec::new();
-    let extras = buffer.extras.iter().map(|(_, texel)| texel);
-    for texel in buffer.texels.iter().flatten().chain(extras) {
-        let object = texel.object as usize;
-        if planes.len() <= object {
-            planes.resize_with(object + 1, Planes::default);
-        }
-        planes[object].add(texel);
+    let chunks: Vec<_> = buffer.texels.chunks(CHUNK).collect();
+    let parts = parallel::of_all(&chunks, 1, |texels| {
+        let mut seen = SeenObjects::default();
+        texels.iter().flatten().for_each(|texel| seen.add(texel));
+        seen
+    });
+    let mut seen = SeenObjects::default();
+    for part in parts {
+        seen.join(part);
     }
-    planes.into_iter().map(|it| it.is_curved).collect()
+    for (_, texel) in buffer.extras.iter() {
+        seen.add(texel);
+    }
+    seen.planes.into_iter().map(|it| it.is_curved).collect()
+}
+
+/// For each object the planes that it has been seen in.
+#[derive(Debug, Default)]
+struct SeenObjects {
+    planes: Vec<Planes>,
+}
+
+impl SeenObjects {
+    fn of(&mut self, object: usize) -> &mut Planes {
+        if self.planes.len() <= object {
+            self.planes.resize_with(object + 1, Planes::default);
+        }
+        &mut self.planes[object]
+    }
+
+    fn add(&mut self, texel: &Texel) {
+        self.of(texel.object as usize)
+            .add(texel.position, texel.normal);
+    }
+
+    fn join(&mut self, other: Self) {
+        for (object, planes) in other.planes.into_iter().enumerate() {
+            let known = self.of(object);
+            known.is_curved |= planes.is_curved;
+            for (position, normal) in planes.known {
+                known.add(position, normal);
+            }
+        }
+    }
 }
 
 /// The planes that an object has been seen in.
@@ -37,40 +75,31 @@ struct Planes {
 }
 
 impl Planes {
-    fn add(&mut self, texel: &Texel) {
-        let is_in = |(point, normal): &(Vec3, Vec3)| {
-            let off = (texel.position - point).dot(*normal).abs();
-            let size = texel.position.abs().max(point.abs()).max_element();
-            texel.normal.distance_squared(*normal) <= NORMAL_TOLERANCE * NORMAL_TOLERANCE
+    fn add(&mut self, position: Vec3, normal: Vec3) {
+        let is_in = |(point, other): &(Vec3, Vec3)| {
+            let off = (position - point).dot(*other).abs();
+            let size = position.abs().max(point.abs()).max_element();
+            normal.distance_squared(*other) <= NORMAL_TOLERANCE * NORMAL_TOLERANCE
                 && off <= PLANE_TOLERANCE * size
         };
         // Those seen last are the likeliest.
         if self.is_curved || self.known.iter().rev().any(is_in) {
             return;
         }
-        let is_beside = |(_, normal): &(Vec3, Vec3)| texel.normal.dot(*normal) >= MIN_NORMAL_COSINE;
+        let is_beside = |(_, other): &(Vec3, Vec3)| normal.dot(*other) >= MIN_NORMAL_COSINE;
         self.is_curved = self.known.len() == MOST_PLANES || self.known.iter().any(is_beside);
-        self.known.push((texel.position, texel.normal));
+        self.known.push((position, normal));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pixel_samples::PixelSamples;
 
     fn is_curved(parts: &[(Vec3, Vec3)]) -> bool {
         let mut planes = Planes::default();
         for &(position, normal) in parts {
-            planes.add(&Texel {
-                position,
-                normal: normal.normalize(),
-                shading_normal: normal.normalize(),
-                coverage: 1.0,
-                samples: PixelSamples::ALL,
-                material: 0,
-                object: 0,
-            });
+            planes.add(position, normal.normalize());
         }
         planes.is_curved
     }

@@ -334,7 +334,7 @@ impl FootprintGather {
 /// All footprints' pieces, in their order, and the boxes around them.
 fn cut(densities: &[Density], cutting: &Cutting) -> (Vec<Piece>, Vec<Aabb>) {
     let chunks: Vec<&[Density]> = densities.chunks(CHUNK).collect();
-    let parts = parallel::made(chunks.len() as u32, |number| {
+    let parts = parallel::made(chunks.len() as u32, 1, |number| {
         let (chunk, first) = (chunks[number as usize], number * CHUNK as u32);
         let mut part = Vec::with_capacity(2 * chunk.len());
         for (density, index) in chunk.iter().zip(first..) {

@@ -1,6 +1,8 @@
+use std::sync::{Arc, OnceLock};
+
 use caustics_accel::Intersect;
 use caustics_geometry::Ray;
-use caustics_scene::{Brdf, Camera, World};
+use caustics_scene::{Brdf, Camera, Material, World};
 use glam::Vec3;
 
 use crate::error::RenderError;
@@ -8,6 +10,7 @@ use crate::parallel;
 use crate::picture::PictureOptions;
 use crate::pixel_samples::PixelSamples;
 use crate::screen::Screen;
+use crate::splat_view::SplatView;
 
 /// The least cosine between the normals of two samples of one smooth surface.
 const SMOOTH_COSINE: f32 = 0.98;
@@ -41,12 +44,14 @@ pub struct Texel {
 pub struct GBuffer {
     pub(crate) screen: Screen,
     /// The largest part of each pixel, row by row.
-    pub(crate) texels: Vec<Option<Texel>>,
+    pub(crate) texels: Arc<Vec<Option<Texel>>>,
     /// The further parts, ordered by pixel.
-    pub(crate) extras: Vec<(u32, Texel)>,
+    pub(crate) extras: Arc<Vec<(u32, Texel)>>,
     /// How the world's materials reflect; those that are not specular.
     brdfs: Vec<Option<Brdf>>,
     rays: u64,
+    /// What the first splat makes of all this for itself and those that follow.
+    view: OnceLock<Arc<SplatView>>,
 }
 
 impl GBuffer {
@@ -74,28 +79,32 @@ impl GBuffer {
             width,
             height,
         };
-        let rows = parallel::made(height, |y| looker.row(y));
+        let rows = parallel::made(height, 1, |y| looker.row(y));
         let centers: Vec<Option<Texel>> = rows.into_iter().flatten().collect();
-        let refined = parallel::made(height, |y| looker.refine_row(y, &centers));
+        let refined = parallel::made(height, 1, |y| looker.refine_row(y, &centers));
 
-        let mut buffer = Self {
-            screen: Screen::new(camera, width, height),
-            texels: centers.clone(),
-            extras: Vec::new(),
-            brdfs: world
-                .materials()
-                .iter()
-                .map(|material| material.surface.brdf())
-                .collect(),
-            rays: centers.len() as u64,
-        };
+        let (mut texels, mut extras) = (centers.clone(), Vec::new());
+        let mut rays = centers.len() as u64;
         for (pixel, parts) in refined.into_iter().flatten() {
-            buffer.rays += PixelSamples::COUNT as u64;
+            rays += PixelSamples::COUNT as u64;
             let mut parts = parts.into_iter();
-            buffer.texels[pixel as usize] = parts.next();
-            buffer.extras.extend(parts.map(|part| (pixel, part)));
+            texels[pixel as usize] = parts.next();
+            extras.extend(parts.map(|part| (pixel, part)));
         }
-        Ok(buffer)
+        let brdf = |material: &Material| material.surface.brdf();
+        Ok(Self {
+            screen: Screen::new(camera, width, height),
+            texels: Arc::new(texels),
+            extras: Arc::new(extras),
+            brdfs: world.materials().iter().map(brdf).collect(),
+            rays,
+            view: OnceLock::new(),
+        })
+    }
+
+    /// What splats ask of this buffer, made when the first one asks.
+    pub(crate) fn splat_view(&self) -> &SplatView {
+        self.view.get_or_init(|| Arc::new(SplatView::of(self)))
     }
 
     /// How a texel of this buffer reflects.

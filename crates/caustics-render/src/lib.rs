@@ -116,7 +116,9 @@ mod splat;
 mod splat_band;
 mod splat_bounds;
 mod splat_level;
+mod splat_view;
 mod surroundings;
+mod texel_level;
 mod thinning;
 mod truncated_kernel;
 

@@ -1,14 +1,22 @@
 //! Work on all threads where the feature allows, whose results do not depend on how many there are.
 
-/// What is made of each of so many numbers, in their order: rows of a picture, mostly.
-pub(crate) fn made<T: Send>(count: u32, make: impl Fn(u32) -> T + Sync + Send) -> Vec<T> {
+/// What is made of each of so many numbers, in their order, by tasks of no fewer than `least`.
+pub(crate) fn made<T: Send>(
+    count: u32,
+    least: usize,
+    make: impl Fn(u32) -> T + Sync + Send,
+) -> Vec<T> {
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;
-        (0..count).into_par_iter().map(make).collect()
+        let numbers = (0..count).into_par_iter().with_min_len(least);
+        numbers.map(make).collect()
     }
     #[cfg(not(feature = "parallel"))]
-    (0..count).map(make).collect()
+    {
+        let _ = least;
+        (0..count).map(make).collect()
+    }
 }
 
 /// What is made of each of some items, in their order, by tasks of no fewer than `least`.

@@ -189,7 +189,7 @@ pub fn render<I: Intersect + ?Sized>(
         progress(1);
         finished
     };
-    let rows: Vec<Row> = parallel::made(options.height, finish);
+    let rows: Vec<Row> = parallel::made(options.height, 1, finish);
 
     let mut picture = Picture {
         direct: Image::new(options.width, options.height)?,

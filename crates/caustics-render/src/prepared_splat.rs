@@ -10,8 +10,8 @@ use crate::gate::Gate;
 use crate::gbuffer::Texel;
 use crate::screen::Screen;
 use crate::splat_bounds::Bounds;
-use crate::splat_level::margin;
 use crate::surroundings::Surroundings;
+use crate::texel_level::margin;
 use crate::truncated_kernel::{Kernels, TruncatedKernel};
 
 /// Pixels a side of a level's pixel on the level below.

@@ -8,6 +8,7 @@ use crate::parallel;
 use crate::prepared_splat::{LEVELS, Prepared, Splat};
 use crate::screen::Screen;
 use crate::splat_level::Level;
+use crate::splat_view::PassView;
 use crate::surroundings::Surroundings;
 use crate::truncated_kernel::Kernels;
 
@@ -47,18 +48,13 @@ pub fn splat(
     options: &FootprintOptions,
 ) -> Result<(Image, SplatStats), RenderError> {
     options.validate()?;
-    let passes = || {
-        let mut passes = vec![Pass::new(Level::finest(buffer, false))];
-        if buffer.is_glossy() {
-            passes.push(Pass::new(Level::finest(buffer, true)));
-        }
-        passes
-    };
-    let (mut passes, surroundings) = parallel::both(passes, || Surroundings::of(buffer));
+    let view = buffer.splat_view();
+    let surroundings = &view.surroundings;
+    let mut passes: Vec<Pass<'_>> = view.passes.iter().map(Pass::new).collect();
     let kernels = Kernels::of(options);
     let mut stats = SplatStats::default();
     for batch in photons.chunks(BATCH) {
-        let mut prepared = prepare(batch, &buffer.screen, &surroundings, options, kernels);
+        let mut prepared = prepare(batch, &buffer.screen, surroundings, options, kernels);
         for fate in &prepared {
             match fate {
                 Prepared::Splat(_) => stats.splatted += 1,
@@ -71,12 +67,12 @@ pub fn splat(
         prepared.extend(caught(
             batch,
             &buffer.screen,
-            &surroundings,
+            surroundings,
             options,
             kernels,
         ));
         for pass in &mut passes {
-            pass.accumulate(&prepared, &buffer.screen, &surroundings);
+            pass.accumulate(&prepared, &buffer.screen, surroundings);
         }
     }
     let mut image = Image::new(buffer.width(), buffer.height())?;
@@ -86,20 +82,17 @@ pub fn splat(
     Ok((image, stats))
 }
 
-/// The texels that reflect in one way, at all levels that serve.
+/// The light of texels that reflect in one way.
 struct Pass<'a> {
-    /// The finest first; at least one.
+    view: &'a PassView,
+    /// The finest first.
     levels: Vec<Level<'a>>,
 }
 
 impl<'a> Pass<'a> {
-    fn new(finest: Level<'a>) -> Self {
-        let coarser = finest.coarsest(LEVELS as u8 - 1);
-        let mut levels = vec![finest];
-        for level in 0..usize::from(coarser) {
-            levels.push(levels[level].coarser());
-        }
-        Self { levels }
+    fn new(view: &'a PassView) -> Self {
+        let levels = view.levels.iter().map(Level::new).collect();
+        Self { view, levels }
     }
 
     fn accumulate(&mut self, prepared: &[Prepared], screen: &Screen, surroundings: &Surroundings) {
@@ -116,15 +109,16 @@ impl<'a> Pass<'a> {
         };
         let levels = self.levels.iter_mut().enumerate().collect();
         parallel::each(levels, |(number, level)| {
-            level.accumulate(prepared, surroundings, number);
+            level.accumulate(prepared, screen, surroundings, number);
         });
     }
 
     fn add_to(mut self, image: &mut Image) {
+        let (reflectance, extras) = (&self.view.reflectance, &self.view.extra_reflectance);
         while let Some(coarse) = self.levels.pop() {
             match self.levels.last_mut() {
                 Some(fine) => fine.add_coarser(&coarse),
-                None => coarse.add_to(image),
+                None => coarse.add_to(reflectance, extras, image),
             }
         }
     }

@@ -2,14 +2,15 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::columns::{ColumnsMut, TexelColumns};
+use crate::columns::ColumnsMut;
 use crate::footprint_integral::FootprintIntegral;
 use crate::gbuffer::Texel;
 use crate::pixel_samples::PixelSamples;
 use crate::prepared_splat::{Prepared, Splat};
 use crate::screen::Screen;
-use crate::splat_level::{Reflection, margin};
+
 use crate::surroundings::{Relation, Surroundings, TILE};
+use crate::texel_level::{Reflection, margin};
 
 /// A band of rows and the splats that overlap it.
 pub(crate) struct BandTask<'a> {
@@ -20,7 +21,6 @@ pub(crate) struct BandTask<'a> {
     pub(crate) screen: &'a Screen,
     pub(crate) reflection: &'a Reflection,
     pub(crate) texels: &'a [Option<Texel>],
-    pub(crate) columns: &'a TexelColumns,
     /// From the band's first row on.
     pub(crate) light: ColumnsMut<'a>,
     pub(crate) first_extra: usize,
@@ -194,10 +194,9 @@ impl BandTask<'_> {
         let to = (row - self.first_row) * self.width + columns.start;
         let (density, gate, light) = (&splat.density, &splat.gate, &mut self.light);
         match self.reflection {
-            Reflection::Lambertian => {
+            Reflection::Lambertian(texels) => {
                 let is_mixed = relation == Relation::Mixed;
-                self.columns
-                    .light(density, gate, is_mixed, from, count, light, to);
+                texels.light(density, gate, is_mixed, from, count, light, to);
             }
             Reflection::Glossy(texels) => texels.light(density, gate, from, count, light, to),
         }
@@ -206,7 +205,7 @@ impl BandTask<'_> {
     /// What a splat adds to an extra texel of the band.
     fn extra(&self, splat: &Splat, extra: usize, texel: &Texel) -> Vec3 {
         match self.reflection {
-            Reflection::Lambertian => splat.irradiance(texel),
+            Reflection::Lambertian(_) => splat.irradiance(texel),
             Reflection::Glossy(texels) => {
                 texels.extra_radiance(self.first_extra + extra, &splat.density, &splat.gate)
             }

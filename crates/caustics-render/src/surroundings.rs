@@ -4,6 +4,7 @@ use crate::density::Density;
 use crate::flat_objects::curved_objects;
 use crate::gate::Gate;
 use crate::gbuffer::{GBuffer, Texel};
+use crate::parallel;
 
 /// Pixels along the sides of the smallest tiles.
 pub(crate) const TILE: usize = 8;
@@ -117,17 +118,22 @@ impl Surroundings {
     pub(crate) fn of(buffer: &GBuffer) -> Self {
         let [width, height] = [buffer.width(), buffer.height()].map(|size| size as usize);
         let mut finest = Tiles::empty(width.div_ceil(TILE), height.div_ceil(TILE));
-        let mut add = |pixel: usize, texel: &Texel| {
-            let (x, y) = (pixel % width / TILE, pixel / width / TILE);
-            finest.tiles[y * finest.width + x].add(texel);
-        };
-        for (pixel, texel) in buffer.texels.iter().enumerate() {
-            if let Some(texel) = texel {
-                add(pixel, texel);
+        let columns = finest.width;
+        let rows = finest.tiles.chunks_mut(columns);
+        let rows = rows.zip(buffer.texels.chunks(TILE * width));
+        parallel::each(rows.collect(), |(tiles, texels)| {
+            for (pixel, texel) in texels.iter().enumerate() {
+                if let Some(texel) = texel {
+                    tiles[pixel % width / TILE].add(texel);
+                }
             }
-        }
-        for (pixel, texel) in &buffer.extras {
-            add(*pixel as usize, texel);
+        });
+        for (pixel, texel) in buffer.extras.iter() {
+            let (x, y) = (
+                *pixel as usize % width / TILE,
+                *pixel as usize / width / TILE,
+            );
+            finest.tiles[y * columns + x].add(texel);
         }
         let mut levels = vec![finest];
         while let Some(coarser) = levels[levels.len() - 1].coarser() {
