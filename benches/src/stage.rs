@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use caustics::accel::BvhOptions;
 use caustics::filter::{Image, read_exr};
+use caustics::render::{GBuffer, RenderError};
 use caustics::scene::{Camera, SceneIntersector, World, gltf};
 
 /// Why a program of this package stops: one line for its user.
@@ -75,5 +76,14 @@ impl Stage {
             reference,
             load_seconds,
         })
+    }
+
+    /// What the camera sees, in the reference's pixels.
+    ///
+    /// # Errors
+    /// If the reference has more pixels than a picture may.
+    pub fn g_buffer(&self) -> Result<GBuffer, RenderError> {
+        let (width, height) = (self.reference.width(), self.reference.height());
+        GBuffer::new(&self.world, &self.intersector, &self.camera, width, height)
     }
 }

@@ -30,11 +30,24 @@ pub fn median_of<T, E>(
     patience: Patience,
     mut run: impl FnMut() -> Result<T, E>,
 ) -> Result<Timed<T>, E> {
+    median_after(patience, || Ok(()), |_| run())
+}
+
+/// Runs something until patience ends, each time with something made for it that is not timed.
+///
+/// # Errors
+/// The first error that either returns.
+pub fn median_after<P, T, E>(
+    patience: Patience,
+    mut prepare: impl FnMut() -> Result<P, E>,
+    mut run: impl FnMut(&P) -> Result<T, E>,
+) -> Result<Timed<T>, E> {
     let begin = Instant::now();
     let mut seconds = Vec::new();
     loop {
+        let prepared = prepare()?;
         let start = Instant::now();
-        let value = run()?;
+        let value = run(&prepared)?;
         seconds.push(start.elapsed().as_secs_f64());
         let runs = seconds.len() as u32;
         if runs >= patience.runs || begin.elapsed().as_secs_f64() >= patience.seconds {

@@ -40,6 +40,9 @@ pub struct Texel {
 /// A pixel inside a surface has one texel. A pixel that an edge goes through has one for each
 /// surface in it, weighted by how much of the pixel it fills, so that a caustic is as
 /// smooth along an edge as a picture with many samples a pixel.
+///
+/// The first splat into a buffer makes what those that follow find there: levels of resolution and
+/// tiles, some 70 bytes a pixel. A clone shares what was made before it.
 #[derive(Clone, Debug)]
 pub struct GBuffer {
     pub(crate) screen: Screen,

@@ -204,3 +204,73 @@ fn place(fine: &TexelLevel, x: usize, y: usize) -> Vec2 {
     let at = Vec2::new(x as f32, y as f32) + 0.5 - fine.margin() as f32;
     at / STRIDE as f32 - 0.5 + MARGIN as f32
 }
+
+#[cfg(test)]
+mod tests {
+    use caustics_accel::BvhOptions;
+    use caustics_geometry::shapes;
+    use caustics_scene::{Camera, Instance, Material, Projection, Scene, Shape, World};
+    use glam::{Affine3A, Quat};
+
+    use super::*;
+    use crate::gbuffer::GBuffer;
+
+    /// What a tilted camera sees of a floor, a ball on it, and nothing beyond: an odd number of pixels.
+    fn floor_and_ball() -> GBuffer {
+        let mut scene = Scene::new();
+        let floor = shapes::quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z);
+        let floor = Shape::Mesh(scene.add_mesh(floor.unwrap()));
+        let ball = Shape::Sphere {
+            center: Vec3::new(0.2, 0.5, 0.1),
+            radius: 0.5,
+        };
+        let grey = scene.add_material(Material::diffuse("grey", Vec3::splat(0.5)));
+        let grey = grey.unwrap();
+        for (name, shape) in [("floor", floor), ("ball", ball)] {
+            scene
+                .add_instance(Instance::new(name, shape, grey))
+                .unwrap();
+        }
+        let turn = Quat::from_rotation_x(-0.9);
+        let pose = Affine3A::from_rotation_translation(turn, Vec3::new(0.0, 3.0, 2.0));
+        let projection = Projection::Perspective { yfov: 1.2 };
+        let camera = Camera::new("above", pose, projection).unwrap();
+        let world = World::new(&scene).unwrap();
+        let intersector = world.intersector(&BvhOptions::default()).unwrap();
+        GBuffer::new(&world, &intersector, &camera, 151, 133).unwrap()
+    }
+
+    #[test]
+    fn rows_are_interpolated_as_their_pixels_are() {
+        let buffer = floor_and_ball();
+        let levels = &buffer.splat_view().passes[0].levels;
+        let mut even = 0;
+        for pair in levels.windows(2).take(4) {
+            let (fine, mut coarse) = (&pair[0], Level::new(&pair[1]));
+            for index in 0..coarse.view.texels.len() {
+                let at = index as f32;
+                coarse.light.x[index] = (at * 0.618_034).fract();
+                coarse.light.y[index] = (at * 0.754_877_7).fract();
+                coarse.light.z[index] = (at * 0.569_840_3).fract();
+            }
+            let mut light = Level::new(fine);
+            light.add_coarser(&coarse);
+            for (index, texel) in fine.texels.iter().enumerate() {
+                let (x, y) = (index % fine.width, index / fine.width);
+                let expected = texel.as_ref().map_or(Vec3::ZERO, |texel| {
+                    coarse.interpolate(place(fine, x, y), texel)
+                });
+                let got = light.light.get(index);
+                assert!(
+                    got.abs_diff_eq(expected, 1e-5),
+                    "level {} at {x}, {y}: {got} in place of {expected}",
+                    fine.depth
+                );
+            }
+            even += pair[1].is_even.iter().filter(|&&it| it).count();
+        }
+        // Both ways are taken: most squares are even, those at the ball's outline are not.
+        let all: usize = levels[1..5].iter().map(|it| it.is_even.len()).sum();
+        assert!(even * 3 > all && even < all, "{even} of {all} are even");
+    }
+}

@@ -1,13 +1,13 @@
 //! One scene's rows.
 
 use caustics::filter::{Comparison, Image};
-use caustics::render::{FootprintGather, FootprintOptions, GBuffer, splat};
+use caustics::render::{FootprintGather, FootprintOptions, splat};
 use caustics::trace::{PhotonMap, TraceOptions, trace_photons};
 use caustics_benches::flip::Flip;
 use caustics_benches::gpu::Gpu;
 use caustics_benches::score::Conditions;
 use caustics_benches::stage::{Failure, Stage};
-use caustics_benches::timing::{Patience, Timed, median_of};
+use caustics_benches::timing::{Patience, Timed, median_after, median_of};
 use caustics_gpu_readback::read_texture;
 use caustics_wgpu::{
     CausticsRenderer, FootprintBatch, FrameLight, FrameParams, Gather, GatherOptions, GatherPoint,
@@ -72,13 +72,6 @@ impl Bench {
     pub(crate) fn measure(&mut self, stage: &Stage, counts: &[u32]) -> Result<Vec<Row>, Failure> {
         let receivers = Receivers::new(&self.gpu, stage);
         let [width, height] = receivers.size;
-        let buffer = GBuffer::new(
-            &stage.world,
-            &stage.intersector,
-            &stage.camera,
-            width,
-            height,
-        )?;
         let scene = SceneBuffers::new(&self.gpu.device, &stage.world)?;
         let mut rows = Vec::new();
         let mut flip = Flip::new(&stage.reference)?;
@@ -91,9 +84,11 @@ impl Bench {
                 trace_photons(&stage.world, &stage.intersector, &options, &|_| {})
             })?;
             let footprints = FootprintOptions::default();
-            let image = median_of(self.patience, || {
-                splat(&buffer, &map.value.photons, &footprints).map(|(image, _)| image)
-            })?;
+            let image = median_after(
+                self.patience,
+                || stage.g_buffer(),
+                |buffer| splat(buffer, &map.value.photons, &footprints).map(|(image, _)| image),
+            )?;
             let (build, gather) = self.gather_by_cpu(&map.value, &receivers)?;
             let mut row = self.row(stage, photons, Way::Cpu, &image.value)?;
             row.stored = map.value.photons.len() as u64;
