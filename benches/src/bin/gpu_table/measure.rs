@@ -71,7 +71,6 @@ impl Bench {
     /// The scene's rows for each number of photons.
     pub(crate) fn measure(&mut self, stage: &Stage, counts: &[u32]) -> Result<Vec<Row>, Failure> {
         let receivers = Receivers::new(&self.gpu, stage);
-        let [width, height] = receivers.size;
         let scene = SceneBuffers::new(&self.gpu.device, &stage.world)?;
         let mut rows = Vec::new();
         let mut flip = Flip::new(&stage.reference)?;
