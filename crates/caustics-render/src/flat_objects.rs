@@ -121,4 +121,28 @@ mod tests {
         let bent = Vec3::new(0.01, 1.0, 0.0);
         assert!(is_curved(&[(Vec3::ZERO, Vec3::Y), (Vec3::ZERO, bent)]));
     }
+
+    #[test]
+    fn an_object_curves_where_two_tasks_saw_different_planes_of_it() {
+        let seen = |parts: &[(Vec3, Vec3)]| {
+            let mut seen = SeenObjects::default();
+            for &(position, normal) in parts {
+                seen.of(1).add(position, normal);
+            }
+            seen
+        };
+        let is_curved = |one: &[(Vec3, Vec3)], other: &[(Vec3, Vec3)]| {
+            let mut joined = seen(one);
+            joined.join(seen(other));
+            assert!(!joined.planes[0].is_curved);
+            joined.planes[1].is_curved
+        };
+        let (floor, step) = ((Vec3::ZERO, Vec3::Y), (Vec3::Y, Vec3::Y));
+        let (further, wall) = ((Vec3::X, Vec3::Y), (Vec3::X, Vec3::X));
+        assert!(!is_curved(&[floor], &[further, wall]));
+        assert!(is_curved(&[floor], &[wall, step]));
+        assert!(is_curved(&[floor], &[further, (2.0 * Vec3::Y, Vec3::Y)]));
+        assert!(is_curved(&[], &[floor, step]));
+        assert!(is_curved(&[floor, step], &[]));
+    }
 }

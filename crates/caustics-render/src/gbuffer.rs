@@ -13,7 +13,7 @@ use crate::screen::Screen;
 use crate::splat_view::SplatView;
 
 /// The least cosine between the normals of two samples of one smooth surface.
-const SMOOTH_COSINE: f32 = 0.98;
+pub(crate) const SMOOTH_COSINE: f32 = 0.98;
 
 /// A receiver, or the part of one, that a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,8 @@ pub struct Texel {
 /// smooth along an edge as a picture with many samples a pixel.
 ///
 /// The first splat into a buffer makes what those that follow find there: levels of resolution and
-/// tiles, some 70 bytes a pixel. A clone shares what was made before it.
+/// tiles, some 70 bytes a pixel, and several times as much where some receivers are glossy. A clone
+/// shares what was made before it.
 #[derive(Clone, Debug)]
 pub struct GBuffer {
     pub(crate) screen: Screen,
@@ -107,7 +108,13 @@ impl GBuffer {
 
     /// What splats ask of this buffer, made when the first one asks.
     pub(crate) fn splat_view(&self) -> &SplatView {
-        self.view.get_or_init(|| Arc::new(SplatView::of(self)))
+        if let Some(view) = self.view.get() {
+            return view;
+        }
+        // Not within `get_or_init`: a thread that waits there for parts of it may take up another splat
+        // into this buffer, and would wait for itself. At worst it is made twice.
+        let view = Arc::new(SplatView::of(self));
+        self.view.get_or_init(|| view)
     }
 
     /// How a texel of this buffer reflects.
@@ -234,5 +241,34 @@ fn is_smooth(one: &Option<Texel>, other: &Option<Texel>) -> bool {
         (None, None) => true,
         (Some(one), Some(other)) => one.is_like(other),
         _ => false,
+    }
+}
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests {
+    use glam::Vec3;
+    use rayon::prelude::*;
+
+    use crate::floor_and_ball::floor_and_ball;
+    use crate::footprint::FootprintOptions;
+    use crate::landed::landed;
+    use crate::splat::splat;
+
+    #[test]
+    fn many_tasks_of_one_pool_may_splat_into_a_new_buffer() {
+        let photons = [landed(Vec3::ZERO, [0.2 * Vec3::X, 0.2 * Vec3::Z])];
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(8);
+        pool.build().unwrap().install(|| {
+            for tasks in 2..34 {
+                let buffer = floor_and_ball();
+                let pictures: Vec<_> = (0..tasks)
+                    .into_par_iter()
+                    .with_max_len(1)
+                    .map(|_| splat(&buffer, &photons, &FootprintOptions::default()).unwrap())
+                    .collect();
+                assert!(pictures[0].0.pixels().iter().any(|it| it[0] > 0.0));
+                assert!(pictures.windows(2).all(|it| it[0] == it[1]));
+            }
+        });
     }
 }

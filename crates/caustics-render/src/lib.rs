@@ -94,6 +94,8 @@ mod estimate;
 mod extent_bounds;
 mod eye;
 mod flat_objects;
+#[cfg(test)]
+mod floor_and_ball;
 mod footprint;
 mod footprint_gather;
 mod footprint_integral;

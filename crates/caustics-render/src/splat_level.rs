@@ -207,38 +207,8 @@ fn place(fine: &TexelLevel, x: usize, y: usize) -> Vec2 {
 
 #[cfg(test)]
 mod tests {
-    use caustics_accel::BvhOptions;
-    use caustics_geometry::shapes;
-    use caustics_scene::{Camera, Instance, Material, Projection, Scene, Shape, World};
-    use glam::{Affine3A, Quat};
-
     use super::*;
-    use crate::gbuffer::GBuffer;
-
-    /// What a tilted camera sees of a floor, a ball on it, and nothing beyond: an odd number of pixels.
-    fn floor_and_ball() -> GBuffer {
-        let mut scene = Scene::new();
-        let floor = shapes::quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z);
-        let floor = Shape::Mesh(scene.add_mesh(floor.unwrap()));
-        let ball = Shape::Sphere {
-            center: Vec3::new(0.2, 0.5, 0.1),
-            radius: 0.5,
-        };
-        let grey = scene.add_material(Material::diffuse("grey", Vec3::splat(0.5)));
-        let grey = grey.unwrap();
-        for (name, shape) in [("floor", floor), ("ball", ball)] {
-            scene
-                .add_instance(Instance::new(name, shape, grey))
-                .unwrap();
-        }
-        let turn = Quat::from_rotation_x(-0.9);
-        let pose = Affine3A::from_rotation_translation(turn, Vec3::new(0.0, 3.0, 2.0));
-        let projection = Projection::Perspective { yfov: 1.2 };
-        let camera = Camera::new("above", pose, projection).unwrap();
-        let world = World::new(&scene).unwrap();
-        let intersector = world.intersector(&BvhOptions::default()).unwrap();
-        GBuffer::new(&world, &intersector, &camera, 151, 133).unwrap()
-    }
+    use crate::floor_and_ball::floor_and_ball;
 
     #[test]
     fn rows_are_interpolated_as_their_pixels_are() {

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::columns::TexelColumns;
-use crate::gbuffer::{GBuffer, Texel};
+use crate::gbuffer::{GBuffer, SMOOTH_COSINE, Texel};
 use crate::gloss::GlossyTexels;
 use crate::parallel;
 use crate::prepared_splat::STRIDE;
@@ -17,6 +17,7 @@ pub(crate) const MARGIN: usize = 1;
 /// The least cosine between one normal and others that are alike each with each: two such turns stay
 /// within what [`Texel::is_like`] allows.
 const EVEN_COSINE: f32 = 0.9951;
+const _: () = assert!(2.0 * EVEN_COSINE * EVEN_COSINE - 1.0 > SMOOTH_COSINE);
 
 /// Pixels that a level has beyond the picture, on every side.
 pub(crate) fn margin(depth: u32) -> usize {

@@ -1,6 +1,6 @@
 // One level of receivers at half the resolution of the one before: each stands for four pixels, by
 // the first of them, moved in its plane to where their middle sees it.
-// CPU twin: `Level::coarser` of caustics-render.
+// CPU twin: `TexelLevel::coarser` of caustics-render.
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<uniform> step: SplatStep;

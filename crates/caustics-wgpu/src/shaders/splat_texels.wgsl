@@ -1,5 +1,5 @@
 // Reads the host's depth and normals into one texture of receivers, and halves it level by level.
-// CPU twins: `gbuffer.rs` and `Level::coarser` of caustics-render.
+// CPU twins: `gbuffer.rs` and `TexelLevel::coarser` of caustics-render.
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var host_surface: texture_2d<f32>;

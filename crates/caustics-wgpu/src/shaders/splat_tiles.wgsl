@@ -3,7 +3,7 @@
 //
 // One count is the 2^32nd part of the sum of the peaks of all footprints on the tile, which no pixel
 // can exceed: nothing overflows. A pixel errs by half a count for each footprint on it.
-// CPU twin: `BandTask` of caustics-render's `splat_level.rs`.
+// CPU twin: `BandTask` of caustics-render's `splat_band.rs`.
 
 @group(0) @binding(0) var<uniform> view: SplatView;
 @group(0) @binding(1) var<uniform> step: SplatStep;

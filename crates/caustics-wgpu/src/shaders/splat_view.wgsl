@@ -1,5 +1,5 @@
 // One view's map between the world and its pixels, and the sizes of its levels of resolution.
-// CPU twins: `screen.rs` and `splat_level.rs` of caustics-render.
+// CPU twins: `screen.rs` and `texel_level.rs` of caustics-render.
 
 const LEVELS: u32 = 7u;
 const TILE: u32 = 16u;
