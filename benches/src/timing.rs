@@ -106,4 +106,24 @@ mod tests {
         .unwrap();
         assert_eq!((timed.value, timed.runs), (4, 1));
     }
+
+    #[test]
+    fn each_run_has_something_made_for_it_alone() {
+        let patience = Patience {
+            runs: 3,
+            seconds: 1e9,
+        };
+        let mut made = 0;
+        let mut used = Vec::new();
+        let prepare = || {
+            made += 1;
+            Ok::<_, ()>(made)
+        };
+        let timed = median_after(patience, prepare, |&it| {
+            used.push(it);
+            Ok(10 * it)
+        });
+        assert_eq!(timed.unwrap().value, 30);
+        assert_eq!(used, [1, 2, 3]);
+    }
 }
