@@ -7,7 +7,8 @@ use glam::{Affine3A, Quat, Vec3};
 
 use crate::gbuffer::GBuffer;
 
-/// What a tilted camera sees of a floor, a ball on it, and nothing beyond: an odd number of pixels.
+/// What a tilted camera sees of a floor, a ball on it, a rod as thin as a pixel, and nothing beyond: an odd
+/// number of pixels.
 pub(crate) fn floor_and_ball() -> GBuffer {
     let mut scene = Scene::new();
     let floor = shapes::quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z);
@@ -16,9 +17,12 @@ pub(crate) fn floor_and_ball() -> GBuffer {
         center: Vec3::new(0.2, 0.5, 0.1),
         radius: 0.5,
     };
+    let (corner, width) = (Vec3::new(-1.2, 0.02, -0.8), 0.02 * Vec3::X);
+    let rod = shapes::quad(corner, Vec3::new(1.0, 0.0, 1.3), -width);
+    let rod = Shape::Mesh(scene.add_mesh(rod.unwrap()));
     let grey = scene.add_material(Material::diffuse("grey", Vec3::splat(0.5)));
     let grey = grey.unwrap();
-    for (name, shape) in [("floor", floor), ("ball", ball)] {
+    for (name, shape) in [("floor", floor), ("ball", ball), ("rod", rod)] {
         scene
             .add_instance(Instance::new(name, shape, grey))
             .unwrap();
