@@ -50,9 +50,9 @@ use crate::truncated_kernel::Kernels;
 ///
 /// # Cost
 /// A search costs about as much as there are footprints on its point, which
-/// [`FootprintOptions::max_overlaps`] limits. Long ones that lie askew
-/// would cost more, since the boxes around them are mostly empty: they are cut into up to 256
-/// pieces, lengthwise and by their height above the receiver, as long as that saves enough. Of
+/// [`FootprintOptions::max_overlaps`](crate::FootprintOptions::max_overlaps) limits. Long ones that
+/// lie askew would cost more, since the boxes around them are mostly empty: they are cut into up to
+/// 256 pieces, lengthwise and by their height above the receiver, as long as that saves enough. Of
 /// footprints far larger than the scene only the part in it is cut.
 #[derive(Clone, Debug)]
 pub struct FootprintGather {
